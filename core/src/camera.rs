@@ -1,0 +1,81 @@
+//! Cameras: arrays of views, depth and label images by ray casting, the noise model, and the projection of an image
+//! into the grid.
+//!
+//! A camera looks along its own +z with x right and y down (the usual optical frame); `world_from_camera` places it
+//! in the shelf's frame. Depth is the distance along the optical axis, metres.
+
+use crate::grid::VoxelSet;
+use crate::Pose;
+use serde::{Deserialize, Serialize};
+
+/// A view by its position in its array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct ViewId(pub u16);
+
+/// A pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Intrinsics {
+    /// Image width, pixels.
+    pub width: usize,
+    /// Image height, pixels.
+    pub height: usize,
+    /// Focal length, pixels.
+    pub focal_px: f32,
+    /// Nearest and farthest depth that the sensor reports, metres.
+    pub depth_range_m: [f32; 2],
+}
+
+/// One candidate camera pose.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Its position in the array.
+    pub id: ViewId,
+    /// The camera's pose.
+    pub world_from_camera: Pose,
+    /// The point that it looks at, metres.
+    pub target: [f32; 3],
+    /// Column and row in the array's positions and the number of the look-at target, for heat maps.
+    pub slot: [u16; 3],
+}
+
+/// An array of candidate views that share one camera.
+#[derive(Clone, Debug)]
+pub struct ViewArray {
+    /// `standard300`, `real75`, or the name of a file.
+    pub name: String,
+    /// The camera.
+    pub intrinsics: Intrinsics,
+    /// Number of positions across, of positions up, and of look-at targets.
+    pub layout: [usize; 3],
+    /// The views, by id.
+    pub views: Vec<View>,
+}
+
+/// No label: the cell was not seen.
+pub const UNOBSERVED: u8 = u8::MAX;
+
+/// What one view saw: row-major images from the top left.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Which view.
+    pub view: ViewId,
+    /// Width and height, pixels.
+    pub size: [usize; 2],
+    /// Depth per pixel, metres; 0 where the sensor gave none.
+    pub depth_m: Vec<f32>,
+    /// Class per pixel; background for shelf and emptiness.
+    pub labels: Vec<u8>,
+    /// Object per pixel, [`u16::MAX`] where none; for counting what shows, never for the belief.
+    pub objects: Vec<u16>,
+}
+
+/// An image projected into the grid: what the belief update sees.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapObservation {
+    /// Voxels seen through.
+    pub free: VoxelSet,
+    /// Voxels seen as surface.
+    pub occupied: VoxelSet,
+    /// Class of the top-most labelled point per floor cell, or [`UNOBSERVED`].
+    pub labels: Vec<u8>,
+}

@@ -1,0 +1,179 @@
+//! The planner: look or push?
+//!
+//! Look (first view of IGV) if `IGV > IGM + gamma Reg`, else push; `Reg = min(0, H_s(belief) - H_s(predicted))` over the
+//! semantic map and `gamma = 1/5`. A [`Decision`] keeps everything that was weighed.
+
+use crate::belief::{Belief, BeliefUpdate};
+use crate::camera::{ViewArray, ViewId};
+use crate::push::Rejection;
+use crate::tool::{Push, Tool};
+use serde::{Deserialize, Serialize};
+
+/// Weight of the disturbance term.
+pub const GAMMA: f32 = 0.2;
+
+/// What the robot does at one step.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Action {
+    /// Take an image from a view.
+    Look {
+        /// The view's id in the array.
+        view: ViewId,
+    },
+    /// Push.
+    Push(Push),
+}
+
+/// A rule that turns a belief and a history into the next action (`DESIGN.md` section 5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PolicyKind {
+    /// The rule above.
+    Mem,
+    /// Best view, never a push.
+    MemNoPush,
+    /// Random views on the classical belief, never a push.
+    Random,
+    /// Random views on the network belief, never a push.
+    RandomCnabu,
+    /// Best views; a random push, predicted, every 5th step.
+    #[serde(rename = "random-push-5")]
+    RandomPush5,
+    /// Best views; a random push, not predicted, every 5th step.
+    #[serde(rename = "random-push-5-blind")]
+    RandomPush5Blind,
+    /// Random views; a random push, not predicted, every 5th step.
+    #[serde(rename = "random-view-push-5")]
+    RandomViewPush5,
+    /// Best views; a random push when two consecutive gains differ by less than 2 %.
+    Saturation,
+    /// Clairvoyant: the view whose real observation cuts the entropy most; never a push.
+    Oracle,
+}
+
+/// Why an action was chosen, in one of the planner's own cases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// Looking tells more: `IGV > IGM + gamma Reg`.
+    LookTellsMore,
+    /// Pushing tells more: `IGV <= IGM + gamma Reg`.
+    PushTellsMore,
+    /// The view that made the last push worth it.
+    ViewOfPush,
+    /// No push in the first three steps.
+    TooEarly,
+    /// No push in the last step.
+    LastStep,
+    /// No push right after a push.
+    JustPushed,
+    /// The map is complete: only looks.
+    MapComplete,
+    /// An object was dropped: only looks.
+    Dropped,
+    /// No feasible push candidate.
+    NoCandidate,
+    /// The policy's schedule or dice.
+    Schedule,
+    /// Chosen by a person in the workbench, against the planner.
+    Manual,
+}
+
+/// One push candidate as the planner saw it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CandidateRecord {
+    /// The push.
+    #[serde(flatten)]
+    pub push: Push,
+    /// Why it was not a candidate, if it was not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rejection: Option<Rejection>,
+    /// Best single-view gain under the predicted belief, nats (coarse unless it is the winner); `None` if rejected.
+    pub gain: Option<f32>,
+    /// The view with that gain.
+    pub view: Option<ViewId>,
+    /// `min(0, H_s(belief) - H_s(predicted))`, nats.
+    pub reg: Option<f32>,
+}
+
+/// Everything that was weighed at one step and what was chosen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Decision {
+    /// What to do.
+    pub action: Action,
+    /// Why.
+    pub reason: Reason,
+    /// Gain of the best pair of views, nats.
+    pub igv: f32,
+    /// Gain of the best push, nats; 0 when none was weighed.
+    pub igm: f32,
+    /// Disturbance of the best push, nats, at most 0.
+    pub reg: f32,
+    /// First and second view of the best pair.
+    pub pair: Vec<ViewId>,
+    /// Gain of every view under the belief before the step, nats, used views included.
+    pub gains: Vec<f32>,
+    /// The push candidates, in the order drawn.
+    #[serde(default)]
+    pub candidates: Vec<CandidateRecord>,
+    /// Position of the best push in `candidates`.
+    #[serde(default)]
+    pub best_push: Option<usize>,
+}
+
+/// What the episode remembers for the planner.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    /// Actions so far, in order.
+    pub actions: Vec<Action>,
+    /// Views used since the last push.
+    pub used_views: Vec<ViewId>,
+    /// The view that made the last push worth it, right after that push.
+    pub view_of_push: Option<ViewId>,
+    /// Best single-view gains of the look steps so far, for saturation.
+    pub best_gains: Vec<f32>,
+    /// Whether an object was dropped.
+    pub dropped: bool,
+}
+
+/// What a decision is made from.
+pub struct Situation<'a> {
+    /// The belief before the step.
+    pub belief: &'a Belief,
+    /// How beliefs change.
+    pub update: &'a dyn BeliefUpdate,
+    /// The candidate views.
+    pub views: &'a ViewArray,
+    /// What pushes.
+    pub tool: &'a Tool,
+    /// What happened so far.
+    pub history: &'a History,
+    /// Number of actions in all.
+    pub budget: usize,
+    /// Seed of the episode.
+    pub seed: u64,
+    /// The belief after really looking from a view: for the clairvoyant oracle only.
+    pub really_look: &'a (dyn Fn(ViewId) -> Belief + Sync),
+}
+
+/// Numbers of the planner that a user may change.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PlannerSettings {
+    /// Push candidates drawn per decision.
+    pub candidates: usize,
+    /// Weight of the disturbance term.
+    pub gamma: f32,
+}
+
+impl Default for PlannerSettings {
+    fn default() -> Self {
+        Self { candidates: 80, gamma: GAMMA }
+    }
+}
+
+/// Decides the next action.
+pub fn decide(_policy: PolicyKind, _settings: &PlannerSettings, _situation: &Situation<'_>) -> Decision {
+    todo!()
+}

@@ -1,0 +1,23 @@
+//! Scores of a belief against the truth: IoU, mIoU, calibration, object verdicts.
+
+use serde::{Deserialize, Serialize};
+
+/// The scored volume is the grid below this height (the tallest class and a margin), metres.
+pub const SCORED_HEIGHT_M: f32 = 0.27;
+
+/// The scores of one belief (`DESIGN.md` section 6).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scores {
+    /// Mean IoU of free and occupied.
+    pub occupancy_iou: f64,
+    /// IoU of occupied.
+    pub occupied_iou: f64,
+    /// Mean IoU over the classes present in truth or prediction, background included.
+    pub semantic_miou: f64,
+    /// Entropy of the occupancy map (scored volume) and the semantic map together, nats.
+    pub entropy_nats: f64,
+    /// Expected calibration error of occupancy, mean over the two true classes.
+    pub mece_occupancy: f64,
+    /// Expected calibration error of semantics, mean over the true classes.
+    pub mece_semantics: f64,
+}

@@ -1,2 +1,3 @@
-//! a
-fn main(){}
+//! `nudge`: the command line of the workbench.
+
+fn main() {}

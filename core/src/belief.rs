@@ -63,7 +63,9 @@ impl Belief {
         let height = self.grid.dims[2];
         self.occupancy
             .chunks_exact(height)
-            .map(|column| column[..levels.min(height)].iter().map(|a| f64::from(bernoulli_entropy(beta_mean(*a)))).sum::<f64>())
+            .map(|column| {
+                column[..levels.min(height)].iter().map(|a| f64::from(bernoulli_entropy(beta_mean(*a)))).sum::<f64>()
+            })
             .sum()
     }
 

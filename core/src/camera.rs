@@ -4,8 +4,8 @@
 //! A camera looks along its own +z with x right and y down (the usual optical frame); `world_from_camera` places it
 //! in the shelf's frame. Depth is the distance along the optical axis, metres.
 
-use crate::grid::VoxelSet;
 use crate::Pose;
+use crate::grid::VoxelSet;
 use serde::{Deserialize, Serialize};
 
 /// A view by its position in its array.

@@ -55,7 +55,12 @@ pub fn informed_voxels(_field: &GainField, _array: &ViewArray, _view: ViewId, _d
 }
 
 /// Where a view's gain comes from: voxel positions and their nats, summed over rays, in ascending order of position.
-pub fn gain_per_voxel(_field: &GainField, _array: &ViewArray, _view: ViewId, _density: RayDensity) -> Vec<(usize, f32)> {
+pub fn gain_per_voxel(
+    _field: &GainField,
+    _array: &ViewArray,
+    _view: ViewId,
+    _density: RayDensity,
+) -> Vec<(usize, f32)> {
     todo!()
 }
 

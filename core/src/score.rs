@@ -21,3 +21,30 @@ pub struct Scores {
     /// Expected calibration error of semantics, mean over the true classes.
     pub mece_semantics: f64,
 }
+
+/// What became of an object in the belief.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Most of its cells are occupied with the right class.
+    Found,
+    /// Most of its cells are occupied, but most of them with another class.
+    Misclassified,
+    /// Most of its cells are believed free or unknown.
+    NotFound,
+    /// A predicted object that is not there.
+    Hallucinated,
+}
+
+/// The verdict on one object.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ObjectVerdict {
+    /// Position in the scene's list; `None` for a hallucinated one.
+    pub object: Option<u16>,
+    /// Class name, of the truth or, for a hallucinated one, of the prediction.
+    pub class: String,
+    /// The verdict.
+    pub verdict: Verdict,
+    /// Middle of its cells on the board, metres.
+    pub position: [f32; 2],
+}

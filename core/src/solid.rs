@@ -156,11 +156,8 @@ impl Solid {
     /// The solid stretched along the axes of its body.
     pub fn scaled(&self, scale: [f32; 3]) -> Self {
         let stretch = |part: &ConvexPart| {
-            let points: Vec<Point> = part
-                .vertices
-                .iter()
-                .map(|p| Point::new(p.x * scale[0], p.y * scale[1], p.z * scale[2]))
-                .collect();
+            let points: Vec<Point> =
+                part.vertices.iter().map(|p| Point::new(p.x * scale[0], p.y * scale[1], p.z * scale[2])).collect();
             ConvexPart::hull(&points)
         };
         Self { parts: self.parts.iter().filter_map(stretch).collect() }
@@ -168,8 +165,7 @@ impl Solid {
 
     /// Convex outline of the footprint (the projection onto the board), counter-clockwise, metres.
     pub fn footprint(&self) -> Vec<[f32; 2]> {
-        let mut points: Vec<[f32; 2]> =
-            self.parts.iter().flat_map(|part| &part.vertices).map(|p| [p.x, p.y]).collect();
+        let mut points: Vec<[f32; 2]> = self.parts.iter().flat_map(|part| &part.vertices).map(|p| [p.x, p.y]).collect();
         convex_outline(&mut points)
     }
 
@@ -182,9 +178,7 @@ impl Solid {
 /// Convex hull of points in the plane (Andrew's monotone chain), counter-clockwise.
 pub fn convex_outline(points: &mut [[f32; 2]]) -> Vec<[f32; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
-    let turn = |o: [f32; 2], a: [f32; 2], b: [f32; 2]| {
-        (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0])
-    };
+    let turn = |o: [f32; 2], a: [f32; 2], b: [f32; 2]| (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
     let mut outline: Vec<[f32; 2]> = Vec::with_capacity(points.len() + 1);
     for pass in 0..2 {
         let base = outline.len();

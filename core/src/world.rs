@@ -48,3 +48,23 @@ impl World {
         todo!()
     }
 }
+
+/// The ground truth: the same shape as a belief's argmax (`ToMap(c)`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TruthMap {
+    /// Numbers of voxels along x, y, z.
+    pub dims: [usize; 3],
+    /// 1 where a voxel's centre is inside an object.
+    pub occupancy: Vec<u8>,
+    /// Class of the tallest occupied voxel above a floor cell, else background.
+    pub labels: Vec<u8>,
+    /// Object with the tallest occupied voxel above a floor cell, [`u16::MAX`] where none.
+    pub objects: Vec<u16>,
+}
+
+impl TruthMap {
+    /// Voxelises bodies exactly: point in shape at voxel centres.
+    pub fn of(_grid: &crate::grid::Grid, _bodies: &[Body]) -> Self {
+        todo!()
+    }
+}

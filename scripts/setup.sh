@@ -1,0 +1,35 @@
+#!/usr/bin/env bash
+# Installs what a bare Debian lacks. `setup.sh build`: the C compiler that some crates need. `setup.sh python DIR`: a
+# virtual environment with NumPy and the stock Rerun tools, which the tests use to read what Nudge writes.
+set -euo pipefail
+
+fail() { echo "setup: $*" >&2; exit 2; }
+
+apt_install() {
+    local sudo=
+    [ "$(id -u)" = 0 ] || sudo=sudo
+    command -v apt-get >/dev/null || fail "please install: $*"
+    echo "setup: installing $*"
+    { $sudo apt-get update -qq && DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends "$@"; } >/dev/null ||
+        fail "apt-get could not install $*"
+}
+
+case "${1:-build}" in
+build)
+    command -v cargo >/dev/null || fail "no cargo found; install Rust from https://rustup.rs"
+    command -v cc >/dev/null || apt_install build-essential
+    ;;
+python)
+    venv=${2:?setup.sh python DIR}
+    [ -e "$venv/ready" ] && exit 0
+    command -v python3 >/dev/null || apt_install python3
+    python3 -c 'import ensurepip, venv' 2>/dev/null || apt_install python3-venv
+    rm -rf "$venv"
+    mkdir -p "$(dirname "$venv")"
+    python3 -m venv "$venv"
+    echo "setup: NumPy and the stock Rerun tools into $venv"
+    "$venv/bin/pip" install -q --disable-pip-version-check numpy==2.2.6 rerun-sdk==0.36.3 || fail "pip could not install numpy and rerun-sdk"
+    touch "$venv/ready"
+    ;;
+*) fail "unknown part: $1" ;;
+esac

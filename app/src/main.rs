@@ -1,3 +1,5 @@
-//! `nudge`: the command line of the workbench.
+//! The binary `nudge`; everything it does is in the library beside it.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    nudge::commands::main()
+}

@@ -1,0 +1,40 @@
+//! `nudge replay`: re-run an episode from its log and verify every step.
+
+use crate::driver::belief_update;
+use indicatif::ProgressBar;
+use nudge_core::episode::{Agreement, EpisodeDir, replay};
+use nudge_core::scene::Catalog;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What was typed.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// The episode's directory
+    episode: PathBuf,
+    /// Print what was found as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let directory = EpisodeDir::open(&args.episode)?;
+    let record = directory.record()?;
+    let (update, _) = belief_update(Some(&record.config.belief), record.config.policy)?;
+    let bar = ProgressBar::new(record.steps.len() as u64);
+    let report =
+        replay(&directory, Arc::new(Catalog::standard()), update, &mut |done, _| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    if args.json {
+        super::print(&serde_json::to_string_pretty(&report)?)?;
+    } else {
+        let words = match report.agreement {
+            Agreement::BitEqual => "bit for bit".to_owned(),
+            Agreement::Within { largest } => format!("within {largest:.1e}"),
+            Agreement::Differs => format!("not at steps {:?}", report.differing_steps),
+        };
+        println!("{}: {} of {} steps run again, the same {words}", args.episode.display(), report.steps, report.budget);
+    }
+    Ok(report.verdict()?)
+}

@@ -1,0 +1,59 @@
+//! What the end-to-end tests share: running the binary, and the stock tools that read what it writes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The `nudge` binary: `NUDGE_BIN`, or the one beside this test's own build.
+pub fn nudge_bin() -> PathBuf {
+    if let Some(path) = std::env::var_os("NUDGE_BIN") {
+        return path.into();
+    }
+    let test = std::env::current_exe().expect("path of this test");
+    let bin = test.parent().and_then(Path::parent).expect("target folder").join("nudge");
+    assert!(bin.exists(), "{} is missing: build it first (make test does)", bin.display());
+    bin
+}
+
+/// The repository's root.
+pub fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("workspace").to_owned()
+}
+
+/// Runs `nudge` with arguments and waits for it.
+pub fn nudge(args: &[&str]) -> Output {
+    Command::new(nudge_bin()).args(args).current_dir(root()).output().expect("nudge starts")
+}
+
+/// Runs `nudge`, expects success and returns what it printed.
+pub fn nudge_ok(args: &[&str]) -> String {
+    let output = nudge(args);
+    assert!(output.status.success(), "nudge {args:?}: {}\n{}", output.status, text(&output.stderr));
+    text(&output.stdout)
+}
+
+/// Runs `nudge`, expects exit code `code` and one line on stderr, and returns that line.
+pub fn nudge_fails(code: i32, args: &[&str]) -> String {
+    let output = nudge(args);
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "nudge {args:?}: {stderr}");
+    let lines: Vec<&str> = stderr.lines().filter(|line| !line.starts_with("warning:")).collect();
+    assert_eq!(lines.len(), 1, "nudge {args:?} should say one line, said: {stderr}");
+    lines[0].to_owned()
+}
+
+/// Bytes as text.
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// A tool of the virtual environment that `make test` sets up (`NUDGE_VENV`); `None`, with a word on stderr, where
+/// there is none.
+pub fn venv_tool(name: &str) -> Option<PathBuf> {
+    let Some(venv) = std::env::var_os("NUDGE_VENV") else {
+        eprintln!("skipped: NUDGE_VENV is not set, so there is no {name} (make test sets it)");
+        return None;
+    };
+    let tool = Path::new(&venv).join("bin").join(name);
+    assert!(tool.exists(), "{} is missing", tool.display());
+    Some(tool)
+}

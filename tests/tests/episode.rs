@@ -1,0 +1,139 @@
+//! An episode from the command line: run, repeat, replay, resume, and what other tools make of its files.
+
+use nudge_tests::{nudge_bin, nudge_fails, nudge_ok, root, text, venv_tool};
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+const SCENE: &str = "scenes/high/01-box-wall.toml";
+
+fn run(out: &Path, more: &[&str]) -> Value {
+    let out = out.to_str().expect("utf-8");
+    let mut args = vec!["run", SCENE, "--policy", "mem", "--belief", "classical", "--seed", "1", "--out", out, "--json"];
+    args.extend(more);
+    serde_json::from_str(&nudge_ok(&args)).expect("JSON on stdout")
+}
+
+/// The record without what the clock says.
+fn timeless(mut record: Value) -> Value {
+    for step in record["steps"].as_array_mut().expect("steps") {
+        step["seconds"] = Value::Null;
+    }
+    record
+}
+
+#[test]
+fn two_runs_agree_and_replay_verifies_them() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (one, two) = (dir.path().join("e1"), dir.path().join("e2"));
+    let first = run(&one, &["--budget", "6"]);
+    let second = run(&two, &["--budget", "6"]);
+    assert_eq!(timeless(first.clone()), timeless(second));
+    for n in 0..=6 {
+        let file = format!("beliefs/{n:03}.npz");
+        assert_eq!(std::fs::read(one.join(&file)).expect(&file), std::fs::read(two.join(&file)).expect(&file), "{file}");
+    }
+
+    let steps = first["steps"].as_array().expect("steps");
+    assert_eq!(steps.len(), 6);
+    assert_eq!((first["format"].as_u64(), first["policy"].as_str()), (Some(1), Some("mem")));
+    for (at, step) in steps.iter().enumerate() {
+        assert_eq!(step["index"].as_u64(), Some(at as u64 + 1));
+        assert_eq!(step["decision"]["gains"].as_array().map(Vec::len), Some(300));
+        assert!(step["scores"]["occupancy_iou"].as_f64().expect("score") > 0.0);
+        assert!(step["seconds"]["decide"].as_f64().expect("seconds") >= 0.0);
+        let kind = step["action"]["kind"].as_str().expect("kind");
+        assert!(if at < 3 { kind == "look" } else { kind == "look" || kind == "push" }, "step {}: {kind}", at + 1);
+    }
+    let entropy = |at: usize| steps[at]["scores"]["entropy_nats"].as_f64().expect("entropy");
+    assert!(entropy(2) < first["prior"]["entropy_nats"].as_f64().expect("prior"));
+
+    let said = nudge_ok(&["replay", one.to_str().expect("utf-8")]);
+    assert!(said.contains("bit for bit"), "{said}");
+    let file = one.join("beliefs/004.npz");
+    std::fs::copy(one.join("beliefs/003.npz"), &file).expect("tamper");
+    let line = nudge_fails(1, &["replay", one.to_str().expect("utf-8")]);
+    assert!(line.contains("step 4"), "{line}");
+}
+
+#[test]
+fn a_killed_run_opens_and_resumes_to_the_same_end() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (whole, cut) = (dir.path().join("whole"), dir.path().join("cut"));
+    let expected = run(&whole, &["--budget", "5"]);
+
+    let mut child = Command::new(nudge_bin())
+        .current_dir(root())
+        .args(["run", SCENE, "--policy", "mem", "--belief", "classical", "--seed", "1", "--budget", "5", "--out"])
+        .arg(&cut)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("nudge starts");
+    let started = Instant::now();
+    while !cut.join("beliefs/002.npz").exists() {
+        assert!(started.elapsed() < Duration::from_secs(300), "the run never wrote its second belief");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    child.kill().expect("SIGKILL");
+    child.wait().expect("gone");
+
+    let record: Value = serde_json::from_str(&std::fs::read_to_string(cut.join("episode.json")).expect("episode.json"))
+        .expect("a killed run leaves whole JSON");
+    assert!(record["steps"].as_array().expect("steps").len() < 5);
+    let again = nudge_fails(2, &["run", SCENE, "--belief", "classical", "--out", cut.to_str().expect("utf-8")]);
+    assert!(again.contains("--resume") && again.contains("--force"), "{again}");
+
+    let resumed = run(&cut, &["--budget", "5", "--resume"]);
+    assert_eq!(timeless(resumed), timeless(expected));
+    for n in 0..=5 {
+        let file = format!("beliefs/{n:03}.npz");
+        assert_eq!(std::fs::read(whole.join(&file)).expect(&file), std::fs::read(cut.join(&file)).expect(&file), "{file}");
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let of = |threads: &str| {
+        let out = dir.path().join(threads);
+        let output = Command::new(nudge_bin())
+            .current_dir(root())
+            .env("RAYON_NUM_THREADS", threads)
+            .args(["run", SCENE, "--belief", "classical", "--seed", "7", "--budget", "5", "--json", "--out"])
+            .arg(out)
+            .output()
+            .expect("nudge starts");
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        timeless(serde_json::from_slice(&output.stdout).expect("JSON"))
+    };
+    assert_eq!(of("1"), of("3"));
+}
+
+#[test]
+fn the_stock_tools_read_the_files() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("e");
+    run(&out, &["--budget", "2"]);
+    assert!(out.join("summary.png").metadata().expect("summary.png").len() > 20_000);
+
+    if let Some(rerun) = venv_tool("rerun") {
+        let verify = Command::new(rerun).args(["rrd", "verify"]).arg(out.join("episode.rrd")).output().expect("rerun");
+        assert!(verify.status.success(), "{}{}", text(&verify.stdout), text(&verify.stderr));
+    }
+    if let Some(python) = venv_tool("python") {
+        let script = "\
+import sys, numpy as np
+b = np.load(sys.argv[1] + '/beliefs/002.npz'); t = np.load(sys.argv[1] + '/truth/000.npz')
+assert b['occupancy'].shape == (160, 80, 80, 2) and b['occupancy'].dtype == np.float16
+assert b['semantics'].shape == (160, 80, 15)
+assert t['occupancy'].shape == (160, 80, 80) and t['labels'].shape == (160, 80) and t['labels'].dtype == np.uint8
+a = b['occupancy'].astype(np.float32); p = a[..., 0] / a.sum(-1)
+assert 0 < p.min() < 0.3 and 0.7 < p.max() < 1, (p.min(), p.max())
+seen = p > 0.6; assert t['occupancy'][seen].mean() > 0.6, t['occupancy'][seen].mean()
+";
+        let check = Command::new(python).args(["-c", script]).arg(&out).output().expect("python");
+        assert!(check.status.success(), "{}", text(&check.stderr));
+    }
+}

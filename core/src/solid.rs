@@ -3,6 +3,10 @@
 //! A convex part is kept as its hull (for contact and pictures) and as half-spaces (for exact point and ray tests), so
 //! that the camera, the physics and the truth map all see the very same shape.
 
+mod columns;
+
+pub(crate) use columns::levels_inside;
+
 use crate::{Point, Pose, Vector};
 
 /// An axis-aligned box, metres.

@@ -69,3 +69,37 @@ impl VoxelSet {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+
+    proptest! {
+        #[test]
+        fn it_is_a_set(
+            a in prop::collection::btree_set(0_usize..150, 0..60),
+            b in prop::collection::btree_set(0_usize..150, 0..60),
+        ) {
+            let grid = Grid { voxel_m: 0.1, dims: [5, 6, 5], origin: [0.0; 3] };
+            let of = |indices: &BTreeSet<usize>| {
+                let mut set = VoxelSet::empty(&grid);
+                indices.iter().for_each(|&index| set.insert(index));
+                set
+            };
+            let listed = |set: &VoxelSet| set.iter().collect::<BTreeSet<_>>();
+            let (mut union, mut difference, mut emptied) = (of(&a), of(&a), of(&a));
+            union.union_with(&of(&b));
+            difference.subtract(&of(&b));
+            a.iter().for_each(|&index| emptied.remove(index));
+            prop_assert!(of(&a).iter().is_sorted());
+            prop_assert_eq!(listed(&of(&a)), a.clone());
+            prop_assert_eq!(listed(&union), a.union(&b).copied().collect());
+            prop_assert_eq!(listed(&difference), a.difference(&b).copied().collect());
+            prop_assert_eq!((of(&a).len(), of(&a).is_empty()), (a.len(), a.is_empty()));
+            prop_assert!((0..150).all(|index| of(&a).contains(index) == a.contains(&index)));
+            prop_assert!(emptied.is_empty());
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! Scene files: TOML as it was typed ([`RawScene`]) becomes a checked [`Scene`], and back.
+//!
+//! ```toml
+//! format = 1
+//! name = "two-cans"
+//! description = "one line"          # optional
+//!
+//! [shelf]
+//! size = [0.80, 0.40, 0.40]         # metres; optional: voxel_m = 0.005, column_closure = true
+//!
+//! [meshes]                          # optional: class = mesh file, relative to this file
+//! chips_can = "chips_can.obj"
+//!
+//! [[object]]
+//! class = "chips_can"
+//! position = [0.1, 0.2]             # metres: centre of the footprint on the board
+//! yaw_deg = 30.0                    # optional
+//! scale = [1.0, 1.0, 1.2]           # optional
+//! mesh = "other_can.stl"            # optional: a shape of this object's own
+//! ```
+
+use super::mesh::load_mesh;
+use super::{Catalog, MeshShape, Object, Scene, Shelf, Warning, check};
+use crate::{Error, Result};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use toml::Spanned;
+
+/// The scene format that this version reads and writes.
+pub const FORMAT: i64 = 1;
+/// Scene files larger than this, bytes, are something else.
+const MAX_BYTES: u64 = 4 << 20;
+
+/// A scene file as it was typed.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawScene {
+    #[serde(rename = "format")]
+    _format: toml::Value,
+    name: Spanned<String>,
+    description: Option<Spanned<String>>,
+    shelf: RawShelf,
+    #[serde(default)]
+    meshes: BTreeMap<String, Spanned<String>>,
+    #[serde(default)]
+    object: Vec<Spanned<RawObject>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawShelf {
+    size: Spanned<[f64; 3]>,
+    voxel_m: Option<Spanned<f64>>,
+    column_closure: Option<bool>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawObject {
+    class: Spanned<String>,
+    position: Spanned<[f64; 2]>,
+    yaw_deg: Option<Spanned<f64>>,
+    scale: Option<Spanned<[f64; 3]>>,
+    mesh: Option<Spanned<String>>,
+}
+
+/// Only the format number, so that a file of another format is told so and not which of its keys are unknown here.
+#[derive(Deserialize)]
+struct RawHead {
+    format: Option<Spanned<toml::Value>>,
+}
+
+/// Where things stand in a scene's file, for errors that name file, line and object. Scenes that came from elsewhere
+/// (embedded in an episode, made by the generator) have no lines.
+pub(super) struct Places {
+    path: PathBuf,
+    /// Line per key: `name`, `shelf.size`, `meshes.tomato_can`, `object.0`, `object.0.position`.
+    lines: BTreeMap<String, usize>,
+}
+
+impl Places {
+    /// No file: errors name the object only.
+    pub fn without_file(path: impl Into<PathBuf>) -> Self {
+        Self { path: path.into(), lines: BTreeMap::new() }
+    }
+
+    fn line(&self, key: &str) -> Option<String> {
+        self.lines.get(key).map(|line| format!("line {line}"))
+    }
+
+    /// An error about the whole file.
+    pub fn file(&self, message: impl Into<String>) -> Error {
+        Error::input(&self.path, "", message)
+    }
+
+    /// An error about a key outside the objects.
+    pub fn key(&self, key: &str, message: impl Into<String>) -> Error {
+        // A key that was left out has its default, so the fault shows at its table.
+        let line = self.line(key).or_else(|| self.line(key.split('.').next()?));
+        Error::input(&self.path, line.unwrap_or_default(), message)
+    }
+
+    /// An error about an entry of `[meshes]`, or about an object's own mesh.
+    pub fn mesh(&self, key: &str, message: impl Into<String>) -> Error {
+        let line = self.line(&format!("meshes.{key}")).map_or(String::new(), |line| line + ", ");
+        Error::input(&self.path, format!("{line}mesh of {key}"), message)
+    }
+
+    /// An error about a key of the object at position `at`.
+    pub fn object(&self, scene: &Scene, at: usize, key: &str, message: impl Into<String>) -> Error {
+        let line = self.line(&format!("object.{at}.{key}")).or_else(|| self.line(&format!("object.{at}")));
+        let line = line.map_or(String::new(), |line| line + ", ");
+        Error::input(&self.path, line + &name_object(at, &scene.objects[at].class), message)
+    }
+
+    /// `object 3 (tomato_can, line 12)`.
+    pub fn name_object(&self, scene: &Scene, at: usize) -> String {
+        let name = name_object(at, &scene.objects[at].class);
+        match self.line(&format!("object.{at}")) {
+            Some(line) => format!("{}, {line})", name.trim_end_matches(')')),
+            None => name,
+        }
+    }
+}
+
+/// Objects are counted from one for people.
+fn name_object(at: usize, class: &str) -> String {
+    format!("object {} ({class})", at + 1)
+}
+
+impl Scene {
+    /// Reads and checks a scene file with the meshes that it names.
+    ///
+    /// # Errors
+    /// One line that names file, line, object number (from one) and class.
+    pub fn load(path: &Path, catalog: &Catalog) -> Result<(Self, Vec<Warning>)> {
+        let length = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len();
+        if length > MAX_BYTES {
+            return Err(Error::input(path, "", format!("{length} bytes; a scene file has at most {MAX_BYTES}")));
+        }
+        let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
+        let text = String::from_utf8(bytes).map_err(|_| Error::input(path, "", "not a scene file (not UTF-8 text)"))?;
+        Self::parse(&text, path, catalog)
+    }
+
+    /// Reads and checks the text of a scene file; `path` is what errors name and what mesh files are relative to.
+    pub fn parse(text: &str, path: &Path, catalog: &Catalog) -> Result<(Self, Vec<Warning>)> {
+        let head: RawHead = toml::from_str(text).map_err(|error| syntax_error(text, path, &error))?;
+        check_format(head.format.as_ref(), text, path)?;
+        let raw: RawScene = toml::from_str(text).map_err(|error| syntax_error(text, path, &error))?;
+        let places = Places { path: path.to_owned(), lines: lines(&raw, text) };
+
+        let mut shelf = Shelf::new(raw.shelf.size.get_ref().map(|v| v as f32));
+        shelf.voxel_m = raw.shelf.voxel_m.map_or(shelf.voxel_m, |voxel| voxel.into_inner() as f32);
+        shelf.column_closure = raw.shelf.column_closure.unwrap_or(shelf.column_closure);
+        let object = |raw: Spanned<RawObject>| {
+            let raw = raw.into_inner();
+            Object {
+                class: raw.class.into_inner(),
+                position: raw.position.get_ref().map(|v| v as f32),
+                yaw_deg: raw.yaw_deg.map_or(0.0, |yaw| yaw.into_inner() as f32),
+                scale: raw.scale.map_or([1.0; 3], |scale| scale.get_ref().map(|v| v as f32)),
+                mesh: raw.mesh.map(Spanned::into_inner),
+            }
+        };
+        let mut scene = Self {
+            name: raw.name.into_inner(),
+            description: raw.description.map(Spanned::into_inner).unwrap_or_default(),
+            shelf,
+            objects: raw.object.into_iter().map(object).collect(),
+            meshes: BTreeMap::new(),
+        };
+        let mut warnings = Vec::new();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        for (class, file) in &raw.meshes {
+            let Some(known) = catalog.by_name(class) else {
+                return Err(places.mesh(class, check::unknown_class(catalog, class)));
+            };
+            let mesh = load_mesh(&folder.join(file.get_ref()), file.get_ref(), Some(known));
+            let (mesh, report) = mesh.map_err(|error| places.mesh(class, error.to_string()))?;
+            warnings.extend(report.warnings.iter().map(|warning| format!("mesh of {class}: {warning}")));
+            scene.meshes.insert(class.clone(), mesh);
+        }
+        for (at, object) in scene.objects.iter().enumerate() {
+            let Some(file) = &object.mesh else { continue };
+            if catalog.by_name(file).is_some() {
+                return Err(places.object(&scene, at, "mesh", format!("mesh `{file}` must be a file, not a class")));
+            }
+            if scene.meshes.contains_key(file) {
+                continue;
+            }
+            let (mesh, report) = load_mesh(&folder.join(file), file, catalog.by_name(&object.class))
+                .map_err(|error| places.object(&scene, at, "mesh", error.to_string()))?;
+            let name = name_object(at, &object.class);
+            warnings.extend(report.warnings.iter().map(|warning| format!("mesh of {name}: {warning}")));
+            scene.meshes.insert(file.clone(), mesh);
+        }
+        warnings.extend(check::check(&scene, catalog, &places)?);
+        Ok((scene, warnings))
+    }
+
+    /// Checks a scene that came from elsewhere than a file (an episode, the generator, a window).
+    pub fn check(&self, catalog: &Catalog) -> Result<Vec<Warning>> {
+        check::check(self, catalog, &Places::without_file(format!("scene {}", self.name)))
+    }
+
+    /// The scene as a file: keys in a fixed order, one block per object, defaults left out.
+    pub fn to_toml(&self) -> String {
+        let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
+        let mut text = format!("format = {FORMAT}\nname = {}\n", quoted(&self.name));
+        // Writing into a string cannot fail.
+        if !self.description.is_empty() {
+            let _ = writeln!(text, "description = {}", quoted(&self.description));
+        }
+        let standard = Shelf::new(self.shelf.size);
+        let _ = writeln!(text, "\n[shelf]\nsize = {:?}", self.shelf.size);
+        if self.shelf.voxel_m != standard.voxel_m {
+            let _ = writeln!(text, "voxel_m = {:?}", self.shelf.voxel_m);
+        }
+        if self.shelf.column_closure != standard.column_closure {
+            let _ = writeln!(text, "column_closure = {}", self.shelf.column_closure);
+        }
+        let own: Vec<&String> = self.objects.iter().filter_map(|object| object.mesh.as_ref()).collect();
+        let of_classes: Vec<(&String, &MeshShape)> = self.meshes.iter().filter(|(key, _)| !own.contains(key)).collect();
+        if !of_classes.is_empty() {
+            text.push_str("\n[meshes]\n");
+        }
+        for (class, mesh) in of_classes {
+            let _ = writeln!(text, "{class} = {}", quoted(&mesh.source));
+        }
+        for object in &self.objects {
+            let _ = write!(text, "\n[[object]]\nclass = {}\nposition = {:?}\n", quoted(&object.class), object.position);
+            if object.yaw_deg != 0.0 {
+                let _ = writeln!(text, "yaw_deg = {:?}", object.yaw_deg);
+            }
+            if object.scale != [1.0; 3] {
+                let _ = writeln!(text, "scale = {:?}", object.scale);
+            }
+            if let Some(mesh) = &object.mesh {
+                let _ = writeln!(text, "mesh = {}", quoted(mesh));
+            }
+        }
+        text
+    }
+
+    /// Writes the scene's file whole or not at all. Mesh files must lie where the scene names them, seen from `path`.
+    pub fn save_toml(&self, path: &Path) -> Result<()> {
+        let folder = folder_of(path);
+        if let Some((key, mesh)) = self.meshes.iter().find(|(_, mesh)| !folder.join(&mesh.source).is_file()) {
+            let message = format!("mesh of {key}: {} is not there; save beside the meshes", mesh.source);
+            return Err(Error::input(path, "", message));
+        }
+        write_whole(path, self.to_toml().as_bytes())
+    }
+}
+
+/// The folder that a file lies in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
+}
+
+/// Writes a file whole or not at all: beside its place first, then renamed into it.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
+    let failed = |error| Error::io(path, error);
+    let mut file =
+        tempfile::Builder::new().prefix(".nudge").suffix(".part").tempfile_in(folder_of(path)).map_err(failed)?;
+    file.write_all(bytes).map_err(failed)?;
+    file.as_file().sync_all().map_err(failed)?;
+    make_readable(file.as_file()).map_err(failed)?;
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// Temporary files are private to their owner; a scene is not.
+#[cfg(unix)]
+fn make_readable(file: &std::fs::File) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(not(unix))]
+fn make_readable(_file: &std::fs::File) -> std::io::Result<()> {
+    Ok(())
+}
+
+fn check_format(format: Option<&Spanned<toml::Value>>, text: &str, path: &Path) -> Result<()> {
+    match format {
+        None => Err(Error::input(path, "line 1", format!("`format = {FORMAT}` is missing"))),
+        Some(format) if format.get_ref().as_integer() == Some(FORMAT) => Ok(()),
+        Some(format) => {
+            let place = format!("line {}", line_at(text, format.span().start));
+            let message = format!("format {} is not known; this version reads format {FORMAT}", format.get_ref());
+            Err(Error::input(path, place, message))
+        }
+    }
+}
+
+fn line_at(text: &str, offset: usize) -> usize {
+    text.as_bytes()[..offset.min(text.len())].iter().filter(|byte| **byte == b'\n').count() + 1
+}
+
+fn lines(raw: &RawScene, text: &str) -> BTreeMap<String, usize> {
+    let mut lines = BTreeMap::new();
+    let mut note = |key: String, offset: usize| lines.insert(key, line_at(text, offset));
+    note("name".into(), raw.name.span().start);
+    if let Some(description) = &raw.description {
+        note("description".into(), description.span().start);
+    }
+    note("shelf".into(), raw.shelf.size.span().start);
+    note("shelf.size".into(), raw.shelf.size.span().start);
+    if let Some(voxel) = &raw.shelf.voxel_m {
+        note("shelf.voxel_m".into(), voxel.span().start);
+    }
+    for (class, file) in &raw.meshes {
+        note(format!("meshes.{class}"), file.span().start);
+    }
+    for (at, object) in raw.object.iter().enumerate() {
+        note(format!("object.{at}"), object.span().start);
+        let object = object.get_ref();
+        note(format!("object.{at}.class"), object.class.span().start);
+        note(format!("object.{at}.position"), object.position.span().start);
+        let spans = [
+            ("yaw_deg", object.yaw_deg.as_ref().map(Spanned::span)),
+            ("scale", object.scale.as_ref().map(Spanned::span)),
+            ("mesh", object.mesh.as_ref().map(Spanned::span)),
+        ];
+        for (key, span) in spans {
+            if let Some(span) = span {
+                note(format!("object.{at}.{key}"), span.start);
+            }
+        }
+    }
+    lines
+}
+
+/// What the TOML reader says, with line and, inside an object's block, the object.
+fn syntax_error(text: &str, path: &Path, error: &toml::de::Error) -> Error {
+    let message = error.message().lines().collect::<Vec<_>>().join(", ");
+    let Some(span) = error.span() else { return Error::input(path, "", message) };
+    let line = line_at(text, span.start);
+    let mut place = format!("line {line}");
+    if let Some(object) = object_of_line(text, line) {
+        place = format!("{place}, {object}");
+    }
+    Error::input(path, place, message)
+}
+
+/// The object whose block holds a line, when the file may not even parse.
+fn object_of_line(text: &str, line: usize) -> Option<String> {
+    let all: Vec<&str> = text.lines().map(str::trim).collect();
+    let header = |text: &str| text.starts_with('[') && !text.contains('=');
+    let is_object = |text: &str| text.replace(' ', "").starts_with("[[object]]");
+    let start = all.iter().take(line).rposition(|text| header(text)).filter(|at| is_object(all[*at]))?;
+    let number = all[..start].iter().filter(|text| is_object(text)).count();
+    let block = all[start + 1..].iter().take_while(|text| !header(text));
+    let class = block.filter_map(|text| text.strip_prefix("class")?.trim_start().strip_prefix('=')).next();
+    Some(match class.and_then(|class| class.split(['"', '\'']).nth(1)) {
+        Some(class) => name_object(number, class),
+        None => format!("object {}", number + 1),
+    })
+}

@@ -1,0 +1,197 @@
+//! Meshes of real objects become shapes: convex parts, metres, z up, centred on their footprint.
+//!
+//! Connected components that are convex are taken as given convex parts; others are decomposed by V-HACD (Mamou and
+//! Ghorbel 2009). A mesh keeps its own direction about z; [`MeshReport::footprint`] tells by how much it is turned.
+
+mod parts;
+mod read;
+mod topology;
+
+use super::outline::{self, Rectangle};
+use super::{Class, MeshShape, Warning};
+use crate::solid::{Bounds, ConvexPart, Solid};
+use crate::{Error, Point, Result};
+use serde::Serialize;
+use std::path::Path;
+
+pub use parts::MAX_PART_VERTICES;
+pub use read::MAX_TRIANGLES;
+
+/// Density of a mesh whose class is not known: packed groceries, kg per cubic metre.
+const ESTIMATED_DENSITY: f32 = 400.0;
+/// Largest edges that are taken for metres as they are.
+const PLAUSIBLE_EDGE_M: [f32; 2] = [0.005, 3.0];
+/// Largest edges that another unit must give to be believed.
+const LIKELY_EDGE_M: [f32; 2] = [0.02, 1.0];
+
+/// How the convex parts of a mesh were obtained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartsFrom {
+    /// Every connected component is convex and was taken as it is.
+    Given,
+    /// By approximate convex decomposition.
+    Decomposed,
+    /// Some components were taken as they are, others decomposed.
+    Both,
+}
+
+/// What a mesh file holds and what was made of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MeshReport {
+    /// The file.
+    pub file: String,
+    /// The class that it stands for, when one was named.
+    pub class: Option<String>,
+    /// Metres per unit of the file: 1 unless the numbers cannot be metres.
+    pub metres_per_unit: f32,
+    /// Triangles in the file.
+    pub triangles: usize,
+    /// Corners after identical ones were joined.
+    pub vertices: usize,
+    /// Connected components.
+    pub components: usize,
+    /// Corners of each convex part.
+    pub part_vertices: Vec<usize>,
+    /// How the parts were obtained.
+    pub parts_from: PartsFrom,
+    /// Size along x, y, z, metres.
+    pub size_m: [f32; 3],
+    /// Smallest rectangle around the footprint, about the origin.
+    pub footprint: Rectangle,
+    /// Area of the footprint's convex outline, square metres.
+    pub footprint_area_m2: f32,
+    /// Volume inside the mesh, cubic metres.
+    pub volume_m3: f32,
+    /// Volume of the convex parts, cubic metres; where parts overlap it counts twice.
+    pub parts_volume_m3: f32,
+    /// The class's mass or the estimate, kg.
+    pub mass_kg: f32,
+    /// Whether the mass is an estimate (0.4 g per cubic centimetre).
+    pub mass_is_estimate: bool,
+    /// What a person should know.
+    pub warnings: Vec<Warning>,
+}
+
+/// Reads a mesh (OBJ, STL, GLB) and makes a shape of it, with a report of what was done.
+///
+/// `source` is what the shape notes as its file (relative to a scene); `class` gives mass and helps to tell units.
+///
+/// # Errors
+/// A file that cannot be read, is no mesh, is empty, open, larger than [`MAX_TRIANGLES`], flat, or has numbers that are
+/// not finite.
+pub fn load_mesh(path: &Path, source: &str, class: Option<&Class>) -> Result<(MeshShape, MeshReport)> {
+    let wrong = |message: String| Error::input(path, "", message);
+    let mut groups = read::read(path)?;
+    let triangles: usize = groups.iter().map(|group| group.triangles.len()).sum();
+    let Some(bounds) = read::bounds(&groups) else {
+        return Err(wrong("the mesh is empty (no triangles)".into()));
+    };
+    let mut warnings = Vec::new();
+    let edge = bounds.size().max();
+    let metres_per_unit = metres_per_unit(edge, class).ok_or_else(|| {
+        wrong(format!("the largest edge is {edge} in the file's units, which is no object in any of m, cm, mm, inches"))
+    })?;
+    if metres_per_unit != 1.0 {
+        warnings.push(format!(
+            "not in metres: the largest edge of {edge} was read as {} ({:.3} m)",
+            unit_name(metres_per_unit),
+            edge * metres_per_unit
+        ));
+        for point in groups.iter_mut().flat_map(|group| &mut group.points) {
+            point.coords *= metres_per_unit;
+        }
+    }
+
+    let topology = topology::components(&groups).map_err(wrong)?;
+    if topology.turned > 0 {
+        warnings.push(format!("{} triangles were wound the wrong way and were turned", topology.turned));
+    }
+    if topology.cavities > 0 {
+        warnings.push(format!("{} closed cavities inside were filled", topology.cavities));
+    }
+    let split = parts::convex_parts(&topology.components);
+    if split.parts.is_empty() {
+        return Err(wrong("the mesh is flat: it encloses no volume".into()));
+    }
+    if split.simplified > 0 {
+        warnings.push(format!("{} parts were simplified to at most {MAX_PART_VERTICES} corners", split.simplified));
+    }
+
+    let mut solid = Solid { parts: split.parts };
+    let rectangle = outline::smallest_rectangle(&solid.footprint())
+        .ok_or_else(|| wrong("the mesh is flat: its footprint has no area".into()))?;
+    centre(&mut solid, rectangle.center);
+    let size = solid.bounds().size();
+    let volume_m3: f64 = topology.components.iter().map(topology::Component::volume).sum();
+    let report = MeshReport {
+        file: path.display().to_string(),
+        class: class.map(|class| class.name.clone()),
+        metres_per_unit,
+        triangles,
+        vertices: topology.components.iter().map(|component| component.points.len()).sum(),
+        components: topology.components.len(),
+        part_vertices: solid.parts.iter().map(|part| part.vertices.len()).collect(),
+        parts_from: split.from,
+        size_m: size.into(),
+        footprint: Rectangle { center: [0.0; 2], ..rectangle },
+        footprint_area_m2: outline::area(&solid.footprint()),
+        volume_m3: volume_m3 as f32,
+        parts_volume_m3: solid.volume(),
+        mass_kg: class.map_or(volume_m3 as f32 * ESTIMATED_DENSITY, |class| class.mass_kg),
+        mass_is_estimate: class.is_none(),
+        warnings,
+    };
+    let corners = |part: &ConvexPart| part.vertices.iter().map(|p| [p.x, p.y, p.z]).collect();
+    Ok((MeshShape { source: source.to_owned(), parts: solid.parts.iter().map(corners).collect() }, report))
+}
+
+/// Moves a solid so that the centre of its footprint is the origin and it stands on the board.
+fn centre(solid: &mut Solid, center: [f32; 2]) {
+    let base = solid.bounds().min.z;
+    let shift = crate::Vector::new(-center[0], -center[1], -base);
+    for part in &mut solid.parts {
+        for vertex in &mut part.vertices {
+            *vertex += shift;
+        }
+        for plane in &mut part.planes {
+            plane.offset += plane.normal.dot(&shift);
+        }
+    }
+}
+
+/// What one unit of the file must be, judged by the largest edge: metres where that is plausible; else the unit that
+/// comes near the class's size; else millimetres, centimetres, or metres that someone divided by a thousand.
+fn metres_per_unit(edge: f32, class: Option<&Class>) -> Option<f32> {
+    let within = |factor: &f32, [low, high]: [f32; 2]| (low..=high).contains(&(edge * factor));
+    if within(&1.0, PLAUSIBLE_EDGE_M) {
+        return Some(1.0);
+    }
+    let units = [0.001, 0.01, 0.0254, 1000.0];
+    let of_class = class.and_then(|class| {
+        let expected = class.solid.bounds().size().max();
+        let misfit = |factor: &f32| (edge * factor / expected).ln().abs();
+        let best = units.into_iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
+        (misfit(&best) < std::f32::consts::LN_2).then_some(best)
+    });
+    of_class
+        .or_else(|| [0.001, 0.01, 1000.0].into_iter().find(|factor| within(factor, LIKELY_EDGE_M)))
+        .or_else(|| within(&0.001, PLAUSIBLE_EDGE_M).then_some(0.001))
+}
+
+fn unit_name(metres_per_unit: f32) -> &'static str {
+    match metres_per_unit {
+        0.001 => "millimetres",
+        0.01 => "centimetres",
+        0.0254 => "inches",
+        _ => "kilometres",
+    }
+}
+
+/// Bounding box of points, `None` without any.
+fn bounds_of(points: impl IntoIterator<Item = Point>) -> Option<Bounds> {
+    Bounds::around(points)
+}
+
+#[cfg(test)]
+mod tests;

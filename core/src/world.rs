@@ -1,36 +1,92 @@
 //! The simulated scene (rapier3d): bodies settle, a push is executed by the tool as a kinematic body, drops are
 //! detected. Deterministic: the same scene and the same pushes give the same poses, bit for bit, on one machine.
 
-use crate::scene::{Body, ObjectId, Shelf};
-use crate::tool::{Push, Tool};
+mod hull;
+mod physics;
+mod truth;
 
-/// The shelf with its bodies and their contacts at one time. A clone is a snapshot: run one, keep the other.
+pub use truth::TruthMap;
+
+use crate::scene::{Body, ObjectId, Shelf};
+use crate::solid::Bounds;
+use crate::tool::{Push, Tool};
+use crate::{Point, Pose, Vector};
+use physics::Physics;
+
+/// Thickness of the shelf's panels outside its interior, metres.
+pub const PANEL_M: f32 = 0.02;
+/// Speed of the tip on the way in, metres per second.
+pub const APPROACH_M_S: f32 = 0.25;
+/// Speed of the tip while it pushes, metres per second.
+pub const PUSH_M_S: f32 = 0.10;
+/// Speed of the tip on the way back, metres per second.
+pub const RETREAT_M_S: f32 = 0.50;
+/// Longest simulated time that bodies are given to come to rest, seconds; what still moves then is stopped.
+pub const SETTLE_LIMIT_S: f32 = 4.0;
+
+/// The panels of the shelf (board, back, left, right, ceiling) as boxes around the interior; the front is open.
+pub fn shelf_panels(shelf: &Shelf) -> [Bounds; 5] {
+    let (min, max) = (shelf.min(), shelf.max());
+    let t = PANEL_M;
+    let panel = |a: [f32; 3], b: [f32; 3]| Bounds { min: Point::from(a), max: Point::from(b) };
+    [
+        panel([min.x - t, min.y, min.z - t], [max.x + t, max.y + t, min.z]),
+        panel([min.x - t, max.y, min.z], [max.x + t, max.y + t, max.z]),
+        panel([min.x - t, min.y, min.z], [min.x, max.y, max.z]),
+        panel([max.x, min.y, min.z], [max.x + t, max.y, max.z]),
+        panel([min.x - t, min.y, max.z], [max.x + t, max.y + t, max.z + t]),
+    ]
+}
+
+/// The shelf with its bodies and their contacts at one time. A clone is a snapshot: run one, keep the other; both have
+/// the same future, bit for bit.
 #[derive(Clone)]
 pub struct World {
     shelf: Shelf,
     bodies: Vec<Body>,
+    /// Per body, whether it has left the board.
+    dropped: Vec<bool>,
+    physics: Physics,
 }
 
 /// What a push did.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PushOutcome {
-    /// How far each object's origin moved, metres, by object.
+    /// How far each object's origin moved, metres, in the order of the bodies that the world was made of; for a drop
+    /// to where it was when it had fallen past the board, 0 for objects dropped earlier.
     pub displacement_m: Vec<f32>,
     /// Objects that left the board during this push.
     pub dropped: Vec<ObjectId>,
     /// Simulated time, seconds.
     pub duration_s: f32,
+    /// Whether the tool was blocked (objects jammed against the shelf) and gave up before the push's end.
+    pub stalled: bool,
+    /// How far the tip really moved along the push, metres.
+    pub pushed_m: f32,
+}
+
+/// What became of the tool's way along one straight leg.
+struct Leg {
+    /// Where the tip ended.
+    tip: Point,
+    /// Whether the tool was blocked before the leg's end.
+    blocked: bool,
 }
 
 impl World {
     /// The world of the given bodies, not yet settled.
     pub fn new(shelf: Shelf, bodies: Vec<Body>) -> Self {
-        Self { shelf, bodies }
+        let physics = Physics::new(&shelf, &bodies);
+        Self { shelf, dropped: vec![false; bodies.len()], bodies, physics }
     }
 
     /// Lets the bodies come to rest; returns the largest displacement of an object, metres.
     pub fn settle(&mut self) -> f32 {
-        todo!()
+        let before = self.poses();
+        self.physics.begin();
+        self.come_to_rest();
+        self.read_back();
+        self.displacements(&before).into_iter().fold(0.0, f32::max)
     }
 
     /// The shelf.
@@ -40,31 +96,134 @@ impl World {
 
     /// The bodies where they are now, dropped ones left out.
     pub fn bodies(&self) -> Vec<Body> {
-        self.bodies.clone()
+        self.bodies.iter().zip(&self.dropped).filter(|(_, dropped)| !**dropped).map(|(body, _)| body.clone()).collect()
+    }
+
+    /// Kinetic energy of all bodies, joules.
+    pub fn kinetic_energy_j(&self) -> f32 {
+        self.physics.kinetic_energy_j()
+    }
+
+    /// How deep two bodies, or a body and the shelf, overlap at most, metres; 0 when nothing touches.
+    pub fn deepest_overlap_m(&self) -> f32 {
+        self.physics.deepest_overlap_m()
     }
 
     /// Carries out a push with the tool: in from before the shelf, along the push, back the same way, then settles.
-    pub fn execute(&mut self, _tool: &Tool, _push: &Push) -> PushOutcome {
-        todo!()
+    ///
+    /// A tool that is blocked (on the way in or along the push) stops there, goes back and reports a stall. Contacts
+    /// are between tool and objects only; the tool does not feel the shelf.
+    pub fn execute(&mut self, tool: &Tool, push: &Push) -> PushOutcome {
+        let before = self.poses();
+        let dropped_before = self.dropped.clone();
+        let (outside, start) = (Tool::approach_point(push), push.start_point());
+        self.physics.begin();
+        let steps_before = self.physics.steps();
+        self.physics.insert_tool(tool, outside);
+
+        let way_in = self.move_tool(outside, start, APPROACH_M_S);
+        let mut tip = way_in.tip;
+        let mut stalled = way_in.blocked;
+        let mut pushed_m = 0.0;
+        if !stalled {
+            let along = self.move_tool(start, push.end_point(), PUSH_M_S);
+            tip = along.tip;
+            stalled = along.blocked;
+            pushed_m = (tip - start).norm();
+            // A tool that cannot even go back is taken away where it is: a real arm would give way.
+            if !self.move_tool(tip, start, RETREAT_M_S).blocked {
+                self.move_tool(start, outside, RETREAT_M_S);
+            }
+        } else {
+            self.move_tool(tip, outside, RETREAT_M_S);
+        }
+        self.physics.remove_tool();
+        self.come_to_rest();
+        self.read_back();
+
+        let ids = self.bodies.iter().zip(self.dropped.iter().zip(&dropped_before));
+        PushOutcome {
+            displacement_m: self.displacements(&before),
+            dropped: ids.filter(|(_, (now, before))| **now && !**before).map(|(body, _)| body.id).collect(),
+            duration_s: (self.physics.steps() - steps_before) as f32 * physics::TIME_STEP_S,
+            stalled,
+            pushed_m,
+        }
+    }
+
+    /// Moves the tool's tip straight from `from` to `to`; stops when it is blocked.
+    fn move_tool(&mut self, from: Point, to: Point, speed_m_s: f32) -> Leg {
+        let travel: Vector = to - from;
+        let steps = (travel.norm() / (speed_m_s * physics::TIME_STEP_S)).ceil() as usize;
+        let mut tip = from;
+        for step in 1..=steps {
+            tip = from + travel * (step as f32 / steps as f32);
+            if self.physics.step_tool(tip) {
+                return Leg { tip, blocked: step < steps };
+            }
+            self.note_drops();
+        }
+        Leg { tip, blocked: false }
+    }
+
+    fn come_to_rest(&mut self) {
+        let limit = (SETTLE_LIMIT_S / physics::TIME_STEP_S) as usize;
+        for _ in 0..limit {
+            if self.physics.is_at_rest() {
+                break;
+            }
+            self.physics.step();
+            self.note_drops();
+        }
+        self.physics.stop_all();
+        for at in 0..self.bodies.len() {
+            // Nothing holds a body up out here; this is for one that was stopped while it slid over the edge.
+            if !self.dropped[at] && self.is_outside(at) {
+                self.drop_body(at);
+            }
+        }
+    }
+
+    /// Takes away bodies that have fallen past the board.
+    fn note_drops(&mut self) {
+        for at in 0..self.bodies.len() {
+            if !self.dropped[at] && self.physics.center_of_mass(at).z < -physics::FALL_M {
+                self.drop_body(at);
+            }
+        }
+    }
+
+    fn drop_body(&mut self, at: usize) {
+        self.bodies[at].world_from_body = self.physics.pose(at);
+        self.dropped[at] = true;
+        self.physics.remove(at);
+    }
+
+    /// Whether a body's centre of mass is no longer over the board.
+    fn is_outside(&self, at: usize) -> bool {
+        let (center, min, max) = (self.physics.center_of_mass(at), self.shelf.min(), self.shelf.max());
+        !(center.y >= min.y && center.z >= min.z && center.x >= min.x && center.x <= max.x && center.y <= max.y)
+    }
+
+    fn poses(&self) -> Vec<Pose> {
+        self.bodies.iter().map(|body| body.world_from_body).collect()
+    }
+
+    fn read_back(&mut self) {
+        for (at, body) in self.bodies.iter_mut().enumerate() {
+            if !self.dropped[at] {
+                body.world_from_body = self.physics.pose(at);
+            }
+        }
+    }
+
+    fn displacements(&self, before: &[Pose]) -> Vec<f32> {
+        let moved = |(body, before): (&Body, &Pose)| {
+            (body.world_from_body.translation.vector - before.translation.vector).norm()
+        };
+        self.bodies.iter().zip(before).map(moved).collect()
     }
 }
 
-/// The ground truth: the same shape as a belief's argmax (`ToMap(c)`).
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct TruthMap {
-    /// Numbers of voxels along x, y, z.
-    pub dims: [usize; 3],
-    /// 1 where a voxel's centre is inside an object.
-    pub occupancy: Vec<u8>,
-    /// Class of the tallest occupied voxel above a floor cell, else background.
-    pub labels: Vec<u8>,
-    /// Object with the tallest occupied voxel above a floor cell, [`u16::MAX`] where none.
-    pub objects: Vec<u16>,
-}
-
-impl TruthMap {
-    /// Voxelises bodies exactly: point in shape at voxel centres.
-    pub fn of(_grid: &crate::grid::Grid, _bodies: &[Body]) -> Self {
-        todo!()
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -4,16 +4,28 @@
 //! A camera looks along its own +z with x right and y down (the usual optical frame); `world_from_camera` places it
 //! in the shelf's frame. Depth is the distance along the optical axis, metres.
 
-use crate::Pose;
+mod noise;
+mod project;
+mod render;
+mod views;
+mod visibility;
+
+pub use noise::NoiseModel;
+pub use project::project;
+pub use render::render;
+pub use visibility::{ObjectVisibility, UNSEEN_PX, hidden_count, hidden_objects, visibility};
+
 use crate::grid::VoxelSet;
+use crate::{Point, Pose, Vector};
 use serde::{Deserialize, Serialize};
 
 /// A view by its position in its array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ViewId(pub u16);
 
-/// A pinhole camera.
+/// A pinhole camera; the principal point is the image's centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Intrinsics {
     /// Image width, pixels.
     pub width: usize,
@@ -23,6 +35,19 @@ pub struct Intrinsics {
     pub focal_px: f32,
     /// Nearest and farthest depth that the sensor reports, metres.
     pub depth_range_m: [f32; 2],
+}
+
+impl Intrinsics {
+    /// The ray through the centre of a pixel, in the camera's frame and one metre deep: `depth * ray` is the point seen.
+    pub fn ray(&self, column: usize, row: usize) -> Vector {
+        let across = |pixel: usize, pixels: usize| (pixel as f32 + 0.5 - 0.5 * pixels as f32) / self.focal_px;
+        Vector::new(across(column, self.width), across(row, self.height), 1.0)
+    }
+
+    /// Principal point, pixels: the image's centre.
+    pub fn principal_px(&self) -> [f32; 2] {
+        [0.5 * self.width as f32, 0.5 * self.height as f32]
+    }
 }
 
 /// One candidate camera pose.
@@ -38,10 +63,17 @@ pub struct View {
     pub slot: [u16; 3],
 }
 
+impl View {
+    /// Where the camera is, metres.
+    pub fn position(&self) -> Point {
+        Point::from(self.world_from_camera.translation.vector)
+    }
+}
+
 /// An array of candidate views that share one camera.
 #[derive(Clone, Debug)]
 pub struct ViewArray {
-    /// `standard300`, `real75`, or the name of a file.
+    /// `standard300`, `real75`, or the name in a file of one's own.
     pub name: String,
     /// The camera.
     pub intrinsics: Intrinsics,
@@ -79,3 +111,6 @@ pub struct MapObservation {
     /// Class of the top-most labelled point per floor cell, or [`UNOBSERVED`].
     pub labels: Vec<u8>,
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,244 @@
+//! Depth and label images by ray casting: one ray through the centre of every pixel, the exact first hit.
+//!
+//! A ray from the camera that is one metre deep per unit of its parameter meets a face plane at the inverse depth
+//! `w = -(n . d) / h`, where `h` is the camera's height above the plane and `d` the ray, so `w` is linear in the
+//! pixel's coordinates. A convex part is hit where it is entered before it is left: at the smallest `w` of the planes
+//! that the camera is outside of, if that is positive and no smaller than the `w` of every other plane. This is the
+//! half-space clipping of [`ConvexPart::ray_enter`](crate::solid::ConvexPart::ray_enter) with the division taken out
+//! of the inner loop, done row by row within the rectangle that a part covers in the image; with the few hundred
+//! parts of a shelf it beats a tree over boxes, which has to be walked anew for every pixel.
+
+use super::{Image, Intrinsics, View};
+use crate::scene::{BACKGROUND, Body, Shelf};
+use crate::solid::{HalfSpace, Solid};
+use crate::world::shelf_panels;
+use crate::{Point, Pose, Vector};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Number of rows that one task renders.
+const ROWS_PER_TASK: usize = 16;
+/// No surface in the tag buffer.
+pub(super) const NOTHING: u16 = u16::MAX;
+
+/// Depth and labels as `view` sees them, without noise.
+///
+/// Shelf panels (board, back, walls and ceiling, [`PANEL_M`](crate::world::PANEL_M) thick) hide what is behind them and
+/// are seen as background with their depth, from inside and from outside; only the front is open. Where nothing is
+/// hit, or nearer or farther than the sensor's range, depth is 0.
+pub fn render(shelf: &Shelf, bodies: &[Body], view: &View, intrinsics: &Intrinsics) -> Image {
+    let scene = ProjectedScene::new(shelf, bodies, &view.world_from_camera, intrinsics);
+    let width = intrinsics.width;
+    let pixels = width * intrinsics.height;
+    let mut image = Image {
+        view: view.id,
+        size: [width, intrinsics.height],
+        depth_m: vec![0.0; pixels],
+        labels: vec![BACKGROUND.0; pixels],
+        objects: vec![u16::MAX; pixels],
+    };
+    let [near, far] = intrinsics.depth_range_m;
+    let tasks = image.depth_m.par_chunks_mut(width * ROWS_PER_TASK).zip(
+        image.labels.par_chunks_mut(width * ROWS_PER_TASK).zip(image.objects.par_chunks_mut(width * ROWS_PER_TASK)),
+    );
+    tasks.enumerate().for_each(|(task, (depth, (labels, objects)))| {
+        let mut row = RowBuffer::new(width);
+        for (at, depth) in depth.chunks_mut(width).enumerate() {
+            scene.scan(task * ROWS_PER_TASK + at, 0..width, &mut row);
+            let (labels, objects) = (&mut labels[at * width..][..width], &mut objects[at * width..][..width]);
+            for column in 0..width {
+                let depth_m = 1.0 / row.inverse_depth[column];
+                if depth_m >= near && depth_m <= far {
+                    depth[column] = depth_m;
+                    if let Some(body) = bodies.get(usize::from(row.tag[column])) {
+                        labels[column] = body.class.0;
+                        objects[column] = body.id.0;
+                    }
+                }
+            }
+        }
+    });
+    image
+}
+
+/// Pixels `columns x rows`.
+#[derive(Clone, Debug)]
+pub(super) struct Rect {
+    pub(super) columns: Range<usize>,
+    pub(super) rows: Range<usize>,
+}
+
+impl Rect {
+    pub(super) fn union(self, other: &Self) -> Self {
+        let hull = |a: Range<usize>, b: &Range<usize>| {
+            if a.is_empty() {
+                b.clone()
+            } else if b.is_empty() {
+                a
+            } else {
+                a.start.min(b.start)..a.end.max(b.end)
+            }
+        };
+        Self { columns: hull(self.columns, &other.columns), rows: hull(self.rows, &other.rows) }
+    }
+}
+
+/// A convex part as the camera sees it.
+pub(super) struct ProjectedPart {
+    /// Coefficients of `w` over column and row (from the image's centre) and its constant, of planes that the camera is
+    /// outside of and that it is inside of.
+    outside: Vec<[f32; 3]>,
+    inside: Vec<[f32; 3]>,
+    pub(super) rect: Rect,
+    /// Index of the body, [`NOTHING`] for the shelf.
+    pub(super) tag: u16,
+}
+
+/// All parts of a scene as one camera sees them.
+pub(super) struct ProjectedScene {
+    pub(super) parts: Vec<ProjectedPart>,
+    center: [f32; 2],
+}
+
+/// What the rays of one row have hit so far.
+pub(super) struct RowBuffer {
+    pub(super) inverse_depth: Vec<f32>,
+    pub(super) tag: Vec<u16>,
+    enter: Vec<f32>,
+    leave: Vec<f32>,
+}
+
+impl RowBuffer {
+    pub(super) fn new(width: usize) -> Self {
+        let zeros = || vec![0.0; width];
+        Self { inverse_depth: zeros(), tag: vec![NOTHING; width], enter: zeros(), leave: zeros() }
+    }
+}
+
+impl ProjectedScene {
+    pub(super) fn new(shelf: &Shelf, bodies: &[Body], world_from_camera: &Pose, intrinsics: &Intrinsics) -> Self {
+        let camera_from_world = world_from_camera.inverse();
+        let mut parts = Vec::new();
+        for panel in shelf_panels(shelf) {
+            let corner = |i: usize| {
+                let pick = |axis: usize| if i >> axis & 1 == 1 { panel.max[axis] } else { panel.min[axis] };
+                Point::new(pick(0), pick(1), pick(2))
+            };
+            let corners: Vec<Point> = (0..8).map(corner).collect();
+            let faces: Vec<HalfSpace> = (0..3)
+                .flat_map(|axis| {
+                    let normal = Vector::ith(axis, 1.0);
+                    [
+                        HalfSpace { normal, offset: panel.max[axis] },
+                        HalfSpace { normal: -normal, offset: -panel.min[axis] },
+                    ]
+                })
+                .collect();
+            parts.push(ProjectedPart::new(&corners, &faces, &camera_from_world, intrinsics, NOTHING));
+        }
+        for (tag, body) in bodies.iter().enumerate() {
+            let camera_from_body = camera_from_world * body.world_from_body;
+            let Solid { parts: convex } = body.solid.as_ref();
+            parts.extend(convex.iter().map(|part| {
+                ProjectedPart::new(&part.vertices, &part.planes, &camera_from_body, intrinsics, tag as u16)
+            }));
+        }
+        parts.retain(|part| !part.rect.columns.is_empty() && !part.rect.rows.is_empty());
+        Self { parts, center: intrinsics.principal_px() }
+    }
+
+    /// Finds the first hit of the rays of `columns` in a row, into the same columns of `buffer`.
+    pub(super) fn scan(&self, row: usize, columns: Range<usize>, buffer: &mut RowBuffer) {
+        buffer.inverse_depth[columns.clone()].fill(0.0);
+        buffer.tag[columns.clone()].fill(NOTHING);
+        let v = row as f32 + 0.5 - self.center[1];
+        for part in self.parts.iter().filter(|part| part.rect.rows.contains(&row)) {
+            let start = part.rect.columns.start.max(columns.start);
+            let end = part.rect.columns.end.min(columns.end);
+            if start >= end {
+                continue;
+            }
+            let first = start as f32 + 0.5 - self.center[0];
+            let enter = &mut buffer.enter[..end - start];
+            enter.fill(f32::INFINITY);
+            for [a, b, c] in &part.outside {
+                let base = b * v + c;
+                for (i, enter) in enter.iter_mut().enumerate() {
+                    let w = a * (first + i as u32 as f32) + base;
+                    *enter = if w < *enter { w } else { *enter };
+                }
+            }
+            let leave = &mut buffer.leave[..end - start];
+            // Hits must lie before the camera.
+            leave.fill(f32::MIN_POSITIVE);
+            for [a, b, c] in &part.inside {
+                let base = b * v + c;
+                for (i, leave) in leave.iter_mut().enumerate() {
+                    let w = a * (first + i as u32 as f32) + base;
+                    *leave = if w > *leave { w } else { *leave };
+                }
+            }
+            let (best, tags) = (&mut buffer.inverse_depth[start..end], &mut buffer.tag[start..end]);
+            for (((enter, leave), best), tag) in enter.iter().zip(leave.iter()).zip(best).zip(tags) {
+                let hit = *enter >= *leave && *enter > *best;
+                *best = if hit { *enter } else { *best };
+                *tag = if hit { part.tag } else { *tag };
+            }
+        }
+    }
+}
+
+impl ProjectedPart {
+    fn new(
+        vertices: &[Point],
+        faces: &[HalfSpace],
+        camera_from_part: &Pose,
+        intrinsics: &Intrinsics,
+        tag: u16,
+    ) -> Self {
+        let mut part =
+            Self { outside: vec![], inside: vec![], rect: image_rect(vertices, camera_from_part, intrinsics), tag };
+        let camera = camera_from_part.inverse_transform_point(&Point::origin()).coords;
+        for face in faces {
+            let normal = camera_from_part.rotation * face.normal;
+            let height = f64::from(face.normal.dot(&camera)) - f64::from(face.offset);
+            // A camera in the very plane is taken to be just inside of it.
+            let height = if height.abs() < 1e-7 { -1e-7 } else { height };
+            let scale = |n: f32, per: f64| (-f64::from(n) / (per * height)) as f32;
+            let focal = f64::from(intrinsics.focal_px);
+            let plane = [scale(normal.x, focal), scale(normal.y, focal), scale(normal.z, 1.0)];
+            if height > 0.0 { &mut part.outside } else { &mut part.inside }.push(plane);
+        }
+        part
+    }
+}
+
+/// The pixels whose rays can hit the hull of `vertices`.
+fn image_rect(vertices: &[Point], camera_from_part: &Pose, intrinsics: &Intrinsics) -> Rect {
+    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    let center = intrinsics.principal_px();
+    let (mut behind, mut before) = (false, false);
+    for vertex in vertices {
+        let seen = camera_from_part * vertex;
+        if seen.z < 1e-3 {
+            behind = true;
+            continue;
+        }
+        before = true;
+        for axis in 0..2 {
+            let pixel = intrinsics.focal_px * seen[axis] / seen.z + center[axis];
+            low[axis] = low[axis].min(pixel);
+            high[axis] = high[axis].max(pixel);
+        }
+    }
+    let size = [intrinsics.width, intrinsics.height];
+    let range = |axis: usize| {
+        if behind {
+            // The hull passes beside the camera: its outline in the image is not that of its corners.
+            return 0..if before { size[axis] } else { 0 };
+        }
+        let clip = |pixel: f32| pixel.clamp(0.0, size[axis] as f32) as usize;
+        clip((low[axis] - 1.0).floor())..clip((high[axis] + 1.0).ceil())
+    };
+    Rect { columns: range(0), rows: range(1) }
+}

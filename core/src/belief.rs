@@ -5,18 +5,24 @@
 //! the Beta's variance for a voxel (Marques et al., manipulation-enhanced mapping; Ulmer et al. 2023).
 
 mod classical;
+mod floor;
 
-pub use classical::Classical;
+pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
+pub use floor::{FloorPlan, Patch};
 
 use crate::camera::MapObservation;
 use crate::grid::{Grid, VoxelSet, Window};
 use crate::scene::{CLASS_COUNT, ClassId};
 use crate::tool::Push;
+use rayon::prelude::*;
 
 /// A floor cell's certainty (largest class probability) above which it counts as known.
 pub const CERTAIN: f32 = 0.85;
 /// The share of known floor cells at which a map is complete.
 pub const COMPLETE_SHARE: f32 = 0.95;
+
+/// How far a floor cell may be from the one where an object is met and still belong to it, metres: the longest object.
+pub const OBJECT_RADIUS_M: f32 = 0.20;
 
 /// What is believed about the shelf at one time step.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,20 +64,29 @@ impl Belief {
         (ClassId(best as u8), p[best])
     }
 
-    /// Entropy of the occupancy map below `levels`, nats.
+    /// Entropy of the occupancy map's lowest `levels` levels, nats.
     pub fn occupancy_entropy(&self, levels: usize) -> f64 {
-        let height = self.grid.dims[2];
-        self.occupancy
-            .chunks_exact(height)
-            .map(|column| {
-                column[..levels.min(height)].iter().map(|a| f64::from(bernoulli_entropy(beta_mean(*a)))).sum::<f64>()
-            })
-            .sum()
+        let (height, depth) = (self.grid.dims[2], self.grid.dims[1]);
+        let of_column = |column: &[[f32; 2]]| -> f64 {
+            column[..levels.min(height)].iter().map(|a| f64::from(bernoulli_entropy(beta_mean(*a)))).sum()
+        };
+        // Slices first, then their sum in order: the same on any number of threads.
+        let slices: Vec<f64> = self
+            .occupancy
+            .par_chunks(height * depth)
+            .map(|slice| slice.chunks_exact(height).map(of_column).sum())
+            .collect();
+        slices.iter().sum()
     }
 
     /// Entropy of the semantic map, nats.
     pub fn semantic_entropy(&self) -> f64 {
         self.semantics.iter().map(|a| f64::from(dirichlet_entropy(a))).sum()
+    }
+
+    /// Entropy of the whole map, every level and the semantics, nats.
+    pub fn entropy(&self) -> f64 {
+        self.occupancy_entropy(self.grid.dims[2]) + self.semantic_entropy()
     }
 
     /// Share of floor cells whose certainty is above [`CERTAIN`].
@@ -138,6 +153,21 @@ pub struct PushPrediction {
     pub change: Vec<f32>,
 }
 
+impl PushPrediction {
+    /// `H_s(belief) - H_s(predicted)`, nats: negative when the push blurs more labels than it settles. `belief` is the
+    /// one that the prediction was made from; cells outside the window cancel out.
+    pub fn semantic_entropy_drop(&self, belief: &Belief) -> f64 {
+        self.window
+            .cells(&belief.grid)
+            .zip(&self.semantics)
+            .filter(|&(cell, after)| belief.semantics[cell] != *after)
+            .map(|(cell, after)| {
+                f64::from(dirichlet_entropy(&belief.semantics[cell])) - f64::from(dirichlet_entropy(after))
+            })
+            .sum()
+    }
+}
+
 /// A push and the voxels that its tool sweeps.
 #[derive(Clone, Debug)]
 pub struct SweptPush {
@@ -157,4 +187,107 @@ pub trait BeliefUpdate: Send + Sync {
 
     /// The beliefs that pushes are predicted to leave: `lambda' = sigma_m(lambda, push)`, one prediction per push.
     fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::LN_2;
+
+    fn near(a: f32, b: f32) -> bool {
+        (a - b).abs() < 1e-6
+    }
+
+    /// 4 x 2 x 4 voxels on 8 floor cells.
+    fn small() -> Belief {
+        Belief::uniform(Grid::for_shelf([0.02, 0.01, 0.02], 0.005))
+    }
+
+    #[test]
+    fn entropy_of_hand_made_cells() {
+        assert!(near(bernoulli_entropy(0.5), LN_2));
+        assert!(near(bernoulli_entropy(0.25), 0.562_335_1));
+        assert_eq!((bernoulli_entropy(0.0), bernoulli_entropy(1.0)), (0.0, 0.0));
+        assert!(near(dirichlet_entropy(&[1.0; CLASS_COUNT]), 15.0_f32.ln()));
+        // (16, 1 x 14) / 30: 8/15 ln 15/8 + 14/30 ln 30.
+        let mut a = [1.0; CLASS_COUNT];
+        a[3] = 16.0;
+        assert!(near(dirichlet_entropy(&a), 8.0 / 15.0 * (15.0_f32 / 8.0).ln() + 14.0 / 30.0 * 30.0_f32.ln()));
+    }
+
+    #[test]
+    fn mean_variance_and_vacuity_of_hand_made_parameters() {
+        assert_eq!(beta_mean([3.0, 1.0]), 0.75);
+        // Beta(3, 1): 3 * 1 / (16 * 5).
+        assert!(near(beta_variance([3.0, 1.0]), 0.0375));
+        assert!(near(beta_variance([1.0, 1.0]), 1.0 / 12.0));
+        assert_eq!(dirichlet_vacuity(&[1.0; CLASS_COUNT]), 1.0);
+        assert_eq!(dirichlet_vacuity(&[2.0; CLASS_COUNT]), 0.5);
+    }
+
+    #[test]
+    fn entropy_of_a_map_is_the_sum_of_its_cells() {
+        let mut belief = small();
+        assert!((belief.occupancy_entropy(4) - 32.0 * 2.0_f64.ln()).abs() < 1e-5);
+        assert!((belief.occupancy_entropy(1) - 8.0 * 2.0_f64.ln()).abs() < 1e-5);
+        assert!((belief.semantic_entropy() - 8.0 * 15.0_f64.ln()).abs() < 1e-5);
+        belief.occupancy[0] = [3.0, 1.0];
+        assert!((belief.occupancy_entropy(9) - (31.0 * 2.0_f64.ln() + 0.562_335_1)).abs() < 1e-5);
+        assert!((belief.entropy() - belief.occupancy_entropy(4) - belief.semantic_entropy()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn certainty_is_the_largest_class_probability() {
+        let mut belief = small();
+        assert_eq!(belief.likeliest(0), (ClassId(0), 1.0 / 15.0));
+        belief.semantics[0][7] = 6.0;
+        let (class, certainty) = belief.likeliest(0);
+        assert_eq!(class, ClassId(7));
+        assert!(near(certainty, 0.3));
+        belief.semantics[0][9] = 6.0;
+        assert_eq!(belief.likeliest(0).0, ClassId(7), "the first of equals");
+    }
+
+    #[test]
+    fn a_map_is_complete_when_95_percent_are_certain() {
+        // 10 x 2 cells: 19 certain ones are 95 %.
+        let mut belief = Belief::uniform(Grid::for_shelf([0.05, 0.01, 0.01], 0.005));
+        for cell in 0..18 {
+            belief.semantics[cell][14] = 100.0;
+        }
+        assert!(near(belief.certain_share(), 0.9) && !belief.is_complete());
+        belief.semantics[18][2] = 79.0; // 79 / 93 = 0.8495
+        assert!(!belief.is_complete());
+        belief.semantics[18][2] = 80.0; // 80 / 94 = 0.8511
+        assert!(belief.is_complete());
+    }
+
+    #[test]
+    fn a_prediction_lands_in_its_window_and_nowhere_else() {
+        let mut belief = small();
+        let mut class = [1.0; CLASS_COUNT];
+        class[4] = 16.0;
+        let mut other = [1.0; CLASS_COUNT];
+        other[2] = 6.0;
+        let prediction = PushPrediction {
+            window: Window { x: [1, 3], y: [1, 2] },
+            occupancy: (0..8).map(|i| [2.0 + i as f32, 1.0]).collect(),
+            semantics: vec![other, class],
+            change: vec![0.5, 1.0],
+        };
+        let drop = prediction.semantic_entropy_drop(&belief);
+        let before = belief.clone();
+        belief.apply(&prediction);
+        assert!((drop - (before.semantic_entropy() - belief.semantic_entropy())).abs() < 1e-5 && drop > 0.5);
+        let grid = belief.grid;
+        for index in 0..grid.voxel_count() {
+            let voxel = grid.voxel(index);
+            let inside = (1..3).contains(&voxel.x) && voxel.y == 1;
+            let value = if inside { 2.0 + f32::from((voxel.x - 1) * 4 + voxel.z) } else { 1.0 };
+            assert_eq!(belief.occupancy[index], [value, 1.0], "{voxel:?}");
+        }
+        let last = grid.cell_index(crate::grid::Cell { x: 2, y: 1 });
+        assert_eq!(belief.semantics[last], class);
+        assert_eq!(belief.semantics.iter().filter(|a| **a != [1.0; CLASS_COUNT]).count(), 2);
+    }
 }

@@ -1,0 +1,368 @@
+//! A classical prediction of what a push leaves behind.
+//!
+//! Nothing is simulated. Four things are said, all of them inside a window around the swept volume:
+//!
+//! * **Swept columns are free.** Where the tool has been nothing stands any more: objects stand on the board, do not
+//!   overhang and are taller than the tool's path, so the whole column over a swept floor cell is free, as surely as
+//!   the log-odds limit allows. This holds whether or not something stood there; the reported change of such a cell is
+//!   the largest occupancy probability that the tool met in it.
+//! * **What the tool meets first moves with it.** The object's patch of the floor plan ([`FloorPlan::patch`]) is shifted
+//!   along the push by what is left of it after the contact, up to the walls. Where it stood is free, where it goes its
+//!   evidence goes with it, halved in log-odds (it may turn or slip off), and so do its labels.
+//! * **Evidence of things near the push decays to the prior**, because what moves runs into other things. The chance
+//!   that a cell changes is one within [`NEAR_M`] of the tip's track, which is drawn out by [`AHEAD_M`] beyond its end
+//!   because that is where things go, falls linearly to zero at [`FAR_M`], and is scaled by the probability that the
+//!   tool meets anything. Cells behind the start keep their evidence: nothing moves against a push.
+//! * **Known free space stays free** unless the moved object comes to stand there. If it decayed like the rest, every
+//!   push would promise a large gain for looking again at what was only forgotten: a ray through many voxels of small
+//!   `p` gains up to `H(p) / p` nats, 4 at `p = 0.05` but 1.4 in truly unknown space.
+//!
+//! The posterior is gated with the chance of change: `lambda' = (1 - p) lambda + p lambda_predicted`; swept columns are
+//! free for certain.
+
+use super::{LOG_ODDS_LIMIT, evidence, log_odds};
+use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, PushPrediction, SweptPush, beta_mean};
+use crate::grid::Window;
+use crate::scene::{BACKGROUND, CLASS_COUNT};
+use crate::{Point, Vector};
+
+/// Distance from the tip's track within which a thing surely changes, if the tool meets anything, metres.
+pub const NEAR_M: f32 = 0.03;
+/// Distance from the tip's track from which nothing changes, metres.
+pub const FAR_M: f32 = 0.09;
+/// How far the track is drawn out beyond the end of the push, metres: about the depth of what is pushed.
+pub const AHEAD_M: f32 = 0.06;
+/// Occupancy probability from which a voxel counts as part of a thing.
+pub(super) const SOLID: f32 = 0.6;
+/// Evidence for free space where an object has left, strong enough to outweigh in the gate what was known of it.
+const GONE: f32 = 100.0;
+
+/// The belief that a push is predicted to leave. `plan` holds the belief's things ([`SOLID`]).
+pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> PushPrediction {
+    let grid = &belief.grid;
+    let height = grid.dims[2];
+    // Largest probability that the tool met something, per swept cell; negative where it did not pass.
+    let mut met = vec![-1.0_f32; grid.cell_count()];
+    for index in push.swept.iter() {
+        let cell = &mut met[index / height];
+        *cell = cell.max(beta_mean(belief.occupancy[index]));
+    }
+    let contact = met.iter().copied().fold(0.0, f32::max);
+    let track = Track::of(push);
+    let moved = Moved::of(belief, plan, &met, &track);
+    let window = window(belief, &met, &track, moved.as_ref());
+
+    let free = evidence(-LOG_ODDS_LIMIT, 1.0 + LOG_ODDS_LIMIT.exp());
+    let gone = evidence(-LOG_ODDS_LIMIT, GONE);
+    let mut prediction = PushPrediction {
+        window,
+        occupancy: Vec::with_capacity(window.cell_count() * height),
+        semantics: Vec::with_capacity(window.cell_count()),
+        change: Vec::with_capacity(window.cell_count()),
+    };
+    let mut background = [1.0; CLASS_COUNT];
+    background[usize::from(BACKGROUND.0)] += 1.0;
+    for cell in window.cells(grid) {
+        let column = &belief.occupancy[grid.column(cell)];
+        let before = &belief.semantics[cell];
+        let left = moved.as_ref().is_some_and(|moved| moved.patch.contains(cell));
+        let source = moved.as_ref().and_then(|moved| moved.source(cell));
+        let change;
+        let labels: [f32; CLASS_COUNT];
+        if met[cell] >= 0.0 {
+            change = met[cell];
+            labels = background;
+            prediction.occupancy.extend(column.iter().map(|a| if beta_mean(*a) > beta_mean(free) { free } else { *a }));
+        } else if left || source.is_some() {
+            change = contact;
+            labels = source.map_or(background, |source| belief.semantics[source].map(|a| 0.5 * (1.0 + a)));
+            let stays = column.iter().map(|a| if left && beta_mean(*a) > 0.5 { gone } else { *a });
+            match source.map(|source| &belief.occupancy[grid.column(source)]) {
+                None => prediction.occupancy.extend(column.iter().zip(stays).map(|(a, b)| gated(*a, b, change))),
+                Some(arriving) => {
+                    prediction.occupancy.extend(column.iter().zip(stays).zip(arriving).map(|((a, stays), arrives)| {
+                        let arrives = evidence(0.5 * log_odds(*arrives), 0.5 * (arrives[0] + arrives[1]));
+                        let solid = beta_mean(arrives) > 0.5 && beta_mean(arrives) > beta_mean(stays);
+                        gated(*a, if solid { arrives } else { stays }, change)
+                    }))
+                }
+            }
+        } else {
+            let near = if plan.stands(cell) { track.nearness(grid.cell_center(grid.cell(cell))) } else { 0.0 };
+            change = contact * near;
+            labels = [1.0; CLASS_COUNT];
+            let decayed = |a: &[f32; 2]| if beta_mean(*a) > 0.5 { gated(*a, [1.0; 2], change) } else { *a };
+            if change > 0.0 {
+                prediction.occupancy.extend(column.iter().map(decayed));
+            } else {
+                prediction.occupancy.extend_from_slice(column);
+            }
+        }
+        prediction.change.push(change);
+        prediction.semantics.push(std::array::from_fn(|k| (1.0 - change) * before[k] + change * labels[k]));
+    }
+    prediction
+}
+
+/// `(1 - p) lambda + p lambda_predicted`.
+fn gated(before: [f32; 2], predicted: [f32; 2], p: f32) -> [f32; 2] {
+    std::array::from_fn(|k| (1.0 - p) * before[k] + p * predicted[k])
+}
+
+/// The columns that the prediction may touch: swept cells, everything within reach of the track, and what moves.
+fn window(belief: &Belief, met: &[f32], track: &Track, moved: Option<&Moved>) -> Window {
+    let grid = &belief.grid;
+    let (mut low, mut high) = ([usize::MAX; 2], [0_usize; 2]);
+    let mut include = |at: [usize; 2]| {
+        for axis in 0..2 {
+            low[axis] = low[axis].min(at[axis]);
+            high[axis] = high[axis].max(at[axis] + 1);
+        }
+    };
+    for cell in (0..met.len()).filter(|&cell| met[cell] >= 0.0) {
+        include([cell / grid.dims[1], cell % grid.dims[1]]);
+    }
+    for end in [track.start, track.start + track.direction * track.length] {
+        for reach in [-FAR_M, FAR_M] {
+            let at: [usize; 2] = std::array::from_fn(|axis| {
+                let cell = ((end[axis] + reach - grid.origin[axis]) / grid.voxel_m).floor().max(0.0) as usize;
+                cell.min(grid.dims[axis] - 1)
+            });
+            include(at);
+        }
+    }
+    if let Some(moved) = moved {
+        for &cell in moved.patch.cells() {
+            let at = [cell / grid.dims[1], cell % grid.dims[1]];
+            include(at);
+            include(std::array::from_fn(|axis| (at[axis] as isize + moved.shift[axis]) as usize));
+        }
+    }
+    Window { x: [low[0], high[0]], y: [low[1], high[1]] }
+}
+
+/// The object that the tool meets first, and how far it goes with the tool.
+struct Moved {
+    patch: Patch,
+    /// Cells along x and y.
+    shift: [isize; 2],
+    dims: [usize; 2],
+}
+
+impl Moved {
+    /// `None` when the tool meets nothing that is believed to be there.
+    fn of(belief: &Belief, plan: &FloorPlan, met: &[f32], track: &Track) -> Option<Self> {
+        let grid = &belief.grid;
+        let along = |cell: usize| track.along(grid.cell_center(grid.cell(cell)));
+        let first = (0..met.len())
+            .filter(|&cell| met[cell] >= SOLID && along(cell) >= 0.0)
+            .min_by(|&a, &b| along(a).total_cmp(&along(b)))?;
+        let patch = plan.patch(first, OBJECT_RADIUS_M);
+        let way_m = (track.length - AHEAD_M - along(first) + 0.5 * grid.voxel_m).max(0.0);
+        let dims = [grid.dims[0], grid.dims[1]];
+        let shift = std::array::from_fn(|axis| {
+            let at = |cell: &usize| [cell / dims[1], cell % dims[1]][axis] as isize;
+            let (low, high) =
+                patch.cells().iter().fold((isize::MAX, 0), |(low, high), cell| (low.min(at(cell)), high.max(at(cell))));
+            let wanted = (track.direction[axis] * way_m / grid.voxel_m).round() as isize;
+            wanted.clamp(-low, dims[axis] as isize - 1 - high)
+        });
+        Some(Self { patch, shift, dims })
+    }
+
+    /// Where what comes to stand on a floor cell comes from.
+    fn source(&self, cell: usize) -> Option<usize> {
+        let x = (cell / self.dims[1]).checked_add_signed(-self.shift[0]).filter(|x| *x < self.dims[0])?;
+        let y = (cell % self.dims[1]).checked_add_signed(-self.shift[1]).filter(|y| *y < self.dims[1])?;
+        Some(x * self.dims[1] + y).filter(|&source| self.patch.contains(source))
+    }
+}
+
+/// The tip's way along the push, drawn out ahead.
+struct Track {
+    start: Point,
+    direction: Vector,
+    length: f32,
+}
+
+impl Track {
+    fn of(push: &SweptPush) -> Self {
+        let push = &push.push;
+        Self { start: push.start_point(), direction: push.direction(), length: push.length_m + AHEAD_M }
+    }
+
+    /// How far along the push a point is, metres; negative behind the start.
+    fn along(&self, on_board: Point) -> f32 {
+        Vector::new(on_board.x - self.start.x, on_board.y - self.start.y, 0.0).dot(&self.direction)
+    }
+
+    /// 1 near the track, 0 far from it or behind its start.
+    fn nearness(&self, on_board: Point) -> f32 {
+        let along = self.along(on_board);
+        if along < 0.0 {
+            return 0.0;
+        }
+        let on_track = self.start + self.direction * along.min(self.length);
+        let distance = (on_board.x - on_track.x).hypot(on_board.y - on_track.y);
+        ((FAR_M - distance) / (FAR_M - NEAR_M)).clamp(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Classical;
+    use super::*;
+    use crate::belief::BeliefUpdate;
+    use crate::grid::{Grid, VoxelSet};
+    use crate::scene::ClassId;
+    use crate::tool::Push;
+
+    /// A shelf with a box of class 5 on it, `x` in +-5 cm, `y` in 20 to 28 cm, `z` below 10 cm, and one of class 7 to the
+    /// right of where that is going, `x` in 8 to 12 cm, `y` in 22 to 26 cm; everything else known free. The tool passes
+    /// a corridor 4 cm wide at 4 to 8 cm of height, 5 cm into the box.
+    fn push_into_a_box() -> (Belief, SweptPush) {
+        let grid = Grid::for_shelf([0.80, 0.40, 0.40], 0.005);
+        let mut belief = Belief::uniform(grid);
+        let mut swept = VoxelSet::empty(&grid);
+        for index in 0..grid.voxel_count() {
+            let at = grid.center(grid.voxel(index));
+            let cell = index / grid.dims[2];
+            let box_ = at.x.abs() < 0.05 && (0.20..0.28).contains(&at.y);
+            let other = (0.08..0.12).contains(&at.x) && (0.22..0.26).contains(&at.y);
+            belief.occupancy[index] = evidence(if (box_ || other) && at.z < 0.10 { 3.4 } else { -3.4 }, 40.0);
+            belief.semantics[cell] = [1.0; CLASS_COUNT];
+            belief.semantics[cell][if box_ {
+                5
+            } else if other {
+                7
+            } else {
+                14
+            }] += 5.0;
+            if at.x.abs() < 0.02 && at.y < 0.25 && (0.04..0.08).contains(&at.z) {
+                swept.insert(index);
+            }
+        }
+        let push = Push { start: [0.0, 0.18, 0.06], direction_deg: 90.0, length_m: 0.07 };
+        (belief, SweptPush { push, swept })
+    }
+
+    #[test]
+    fn swept_columns_become_free_and_background() {
+        let (belief, push) = push_into_a_box();
+        let mut after = belief.clone();
+        after.apply(&Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0]);
+        let grid = &belief.grid;
+        for index in push.swept.iter() {
+            for voxel in grid.column(index / grid.dims[2]) {
+                assert!(after.probability(voxel) < 0.035, "{:?}", grid.voxel(voxel));
+            }
+        }
+        let in_box = grid.cell_index(grid.cell_at(Point::new(0.0, 0.22, 0.0)).expect("inside"));
+        assert_eq!(belief.likeliest(in_box).0.0, 5);
+        assert_eq!(after.likeliest(in_box).0, BACKGROUND);
+    }
+
+    #[test]
+    fn the_box_moves_with_the_tool_and_leaves_free_space() {
+        let (belief, push) = push_into_a_box();
+        let mut after = belief.clone();
+        after.apply(&Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0]);
+        let grid = &belief.grid;
+        let voxel = |x: f32, y: f32, z: f32| grid.index(grid.voxel_at(Point::new(x, y, z)).expect("inside"));
+        let p = |x: f32, y: f32, z: f32| (belief.probability(voxel(x, y, z)), after.probability(voxel(x, y, z)));
+        let class = |x: f32, y: f32| after.likeliest(voxel(x, y, 0.0) / grid.dims[2]).0;
+        // The tip meets it after 2 of 7 cm, so it goes 5 cm: from y = 20..28 to 25..33 cm.
+        for x in [-0.048, 0.0, 0.048] {
+            let (before, there) = p(x, 0.27, 0.05);
+            assert!(before > 0.95 && (0.7..0.9).contains(&there), "still there, less sure: {there}");
+            let (before, there) = p(x, 0.327, 0.05);
+            assert!(before < 0.05 && (0.7..0.9).contains(&there), "its back has come here: {there}");
+            assert_eq!(class(x, 0.327), ClassId(5));
+            assert_eq!(p(x, 0.333, 0.05).1, before, "and no farther");
+            assert_eq!(p(x, 0.327, 0.15).1, before, "nor higher");
+        }
+        let (before, beside_the_tool) = p(0.04, 0.22, 0.05);
+        assert!(before > 0.95 && beside_the_tool < 0.05, "it has left: {beside_the_tool}");
+        assert_eq!(class(0.04, 0.22), BACKGROUND);
+    }
+
+    #[test]
+    fn things_near_the_push_are_forgotten_and_the_rest_is_kept() {
+        let (belief, push) = push_into_a_box();
+        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        let mut after = belief.clone();
+        after.apply(prediction);
+        let grid = &belief.grid;
+        let parameters = |x: f32, y: f32, z: f32| {
+            let index = grid.index(grid.voxel_at(Point::new(x, y, z)).expect("inside"));
+            (belief.occupancy[index], after.occupancy[index])
+        };
+        // 8.25 cm from the track: change 0.967 x 0.125, of 38.7 parameters less one.
+        let (before, near) = parameters(0.0825, 0.24, 0.05);
+        assert!((before[0] - near[0] - 0.967_7 * 0.125 * (before[0] - 1.0)).abs() < 0.02, "{before:?} {near:?}");
+        let (before, beyond_reach) = parameters(0.1025, 0.24, 0.05);
+        assert_eq!(before, beyond_reach);
+        let (before, free) = parameters(0.06, 0.24, 0.05);
+        assert_eq!(before, free, "known free space stays");
+        assert!(after.semantic_entropy() > belief.semantic_entropy());
+    }
+
+    #[test]
+    fn what_moves_stops_at_the_walls() {
+        let (belief, mut push) = push_into_a_box();
+        push.push.length_m = 0.20;
+        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        let mut after = belief.clone();
+        after.apply(prediction);
+        let grid = &belief.grid;
+        let solid = |y: usize| after.probability(grid.index(crate::grid::Voxel { x: 80, y: y as u16, z: 5 })) > 0.5;
+        let rows: Vec<usize> = (0..80).filter(|&y| solid(y)).collect();
+        assert_eq!(rows, (64..80).collect::<Vec<_>>(), "16 rows, up to the back wall");
+    }
+
+    #[test]
+    fn nothing_outside_the_window_is_touched_and_the_window_is_not_the_whole_plan() {
+        let (belief, push) = push_into_a_box();
+        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        let grid = &belief.grid;
+        let window = prediction.window;
+        assert!(window.size()[0] < grid.dims[0] / 2, "{window:?}");
+        assert_eq!(prediction.change.len(), window.cell_count());
+        assert_eq!(prediction.semantics.len(), window.cell_count());
+        assert_eq!(prediction.occupancy.len(), window.cell_count() * grid.dims[2]);
+        let mut after = belief.clone();
+        after.apply(prediction);
+        for cell in 0..grid.cell_count() {
+            let at = grid.cell(cell);
+            let (x, y) = (usize::from(at.x), usize::from(at.y));
+            let inside = (window.x[0]..window.x[1]).contains(&x) && (window.y[0]..window.y[1]).contains(&y);
+            let same = after.occupancy[grid.column(cell)] == belief.occupancy[grid.column(cell)]
+                && after.semantics[cell] == belief.semantics[cell];
+            assert!(inside || same, "{at:?}");
+        }
+        assert!(after != belief);
+        assert!(prediction.change.iter().all(|p| (0.0..=1.0).contains(p)));
+    }
+
+    #[test]
+    fn a_push_through_known_air_changes_next_to_nothing() {
+        let (mut belief, push) = push_into_a_box();
+        let air = evidence(-3.5, 40.0);
+        belief.occupancy.fill(air);
+        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        assert!(prediction.change.iter().all(|p| *p < 0.03));
+        assert!(prediction.occupancy.iter().all(|a| beta_mean(*a) < 0.05));
+    }
+
+    #[test]
+    #[ignore = "a measurement: prints seconds for 80 predictions"]
+    fn speed_of_eighty_predictions() {
+        let (belief, push) = push_into_a_box();
+        let pushes = vec![push; 80];
+        let start = std::time::Instant::now();
+        for chunk in pushes.chunks(16) {
+            assert_eq!(Classical.predict_pushes(&belief, chunk).len(), 16);
+        }
+        println!("80 predictions: {:.3} s", start.elapsed().as_secs_f64());
+    }
+}

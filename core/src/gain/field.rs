@@ -1,0 +1,189 @@
+//! A belief's occupancy prepared for walking rays.
+
+use super::code::{OPAQUE, Quantiser};
+use super::{RayDensity, arrivals, skip};
+use crate::belief::{Belief, PushPrediction, beta_mean};
+use crate::camera::{ViewArray, ViewId};
+use crate::grid::{Grid, VoxelSet, Window};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// The most voxels along one axis that fixed-point rays can count.
+const MOST_VOXELS: usize = 2_000;
+
+/// A belief's occupancy prepared for walking rays: 8-bit probabilities in a padded grid, transparent voxels with the
+/// room ahead of them.
+#[derive(Clone)]
+pub struct GainField {
+    pub(super) layout: Layout,
+    /// Code per voxel of the padded grid.
+    pub(super) codes: Vec<u8>,
+    /// Transmittance with which an earlier view arrived, per voxel of the padded grid.
+    pub(super) seen: Option<Arc<Vec<f32>>>,
+}
+
+impl GainField {
+    /// Quantises a belief's occupancy.
+    ///
+    /// # Panics
+    /// If the grid has more than 2,000 voxels along an axis.
+    pub fn new(belief: &Belief) -> Self {
+        let layout = Layout::of(&belief.grid);
+        let [width, depth, height] = layout.grid.dims;
+        let mut codes = vec![OPAQUE; layout.len()];
+        let quantiser = Quantiser::get();
+        let [plane, line, _] = layout.stride;
+        let planes = codes[layout.at([0, 0, 0])..].par_chunks_mut(plane).take(width);
+        planes.zip(belief.occupancy.par_chunks(depth * height)).for_each(|(codes, occupancy)| {
+            for (codes, occupancy) in codes.chunks_mut(line).zip(occupancy.chunks(height)) {
+                for (code, beta) in codes.iter_mut().zip(occupancy) {
+                    *code = quantiser.code(beta_mean(*beta));
+                }
+            }
+        });
+        skip::mark(&mut codes, &layout, Window::whole(&layout.grid), skip::LEVELS);
+        Self { layout, codes, seen: None }
+    }
+
+    /// The grid of the belief.
+    pub fn grid(&self) -> &Grid {
+        &self.layout.grid
+    }
+
+    /// This field with a push's predicted window in place of what stands there.
+    pub fn with_prediction(&self, prediction: &PushPrediction) -> Self {
+        self.patched(prediction).0
+    }
+
+    /// This field where the given voxels still block but no longer inform (a view saw them).
+    pub fn with_seen(&self, seen: &VoxelSet) -> Self {
+        let mut arrival = vec![0.0; self.codes.len()];
+        for index in seen.iter() {
+            arrival[self.layout.padded(index)] = 1.0;
+        }
+        self.with_arrivals(arrival)
+    }
+
+    /// This field after a look from `view`: what a second view adds to the first one.
+    ///
+    /// A voxel that the first view's rays reach with transmittance `T_1` counts for a ray that arrives with `T` only
+    /// by `max(0, T - T_1)`. So what the first view sees for certain no longer counts, what it may see counts partly,
+    /// and a second look from the same place gains nothing. The gain of a pair is then the sum over voxels of `H`
+    /// times the larger of two transmittances (a facility-location function: monotone and submodular, for which the
+    /// greedy choice is within 1 - 1/e of the best), a lower bound of what both views see. `T_1` is taken over rays
+    /// without gaps, because the camera sees every voxel in its view, not only those that sampled rays hit.
+    pub fn with_view(&self, array: &ViewArray, view: ViewId) -> Self {
+        self.with_arrivals(arrivals(self, array, view, RayDensity::gapless(self.grid(), array)))
+    }
+
+    fn with_arrivals(&self, mut arrival: Vec<f32>) -> Self {
+        if let Some(earlier) = &self.seen {
+            for (arrival, earlier) in arrival.iter_mut().zip(earlier.iter()) {
+                *arrival = arrival.max(*earlier);
+            }
+        }
+        Self { layout: self.layout, codes: self.codes.clone(), seen: Some(Arc::new(arrival)) }
+    }
+
+    /// What of a ray's transmittance at a voxel tells something that no earlier view saw.
+    #[inline(always)]
+    pub(super) fn unseen_share(&self, index: usize, transmittance: f32) -> f32 {
+        match &self.seen {
+            None => transmittance,
+            Some(seen) => (transmittance - seen[index]).max(0.0),
+        }
+    }
+
+    /// This field with a prediction, and the box of the voxels that changed in it.
+    pub(super) fn patched(&self, prediction: &PushPrediction) -> (Self, Option<VoxelBox>) {
+        let mut field = self.clone();
+        let window = prediction.window;
+        let height = self.layout.grid.dims[2];
+        let quantiser = Quantiser::get();
+        let mut predicted = prediction.occupancy.chunks_exact(height);
+        let (mut changed, mut blocked) = (None, None);
+        for x in window.x[0]..window.x[1] {
+            for (y, betas) in (window.y[0]..window.y[1]).zip(predicted.by_ref()) {
+                let column = self.layout.at([x, y, 0]);
+                for (z, (code, beta)) in field.codes[column..column + height].iter_mut().zip(betas).enumerate() {
+                    let new = quantiser.code(beta_mean(*beta));
+                    let (was_clear, is_clear) = (skip::is_transparent(*code), new == 0);
+                    if was_clear && is_clear || *code == new {
+                        continue;
+                    }
+                    *code = new;
+                    VoxelBox::add(&mut changed, [x, y, z]);
+                    if was_clear {
+                        VoxelBox::add(&mut blocked, [x, y, z]);
+                    }
+                }
+            }
+        }
+        if let Some(changed) = changed {
+            if let Some(blocked) = blocked {
+                skip::limit(&mut field.codes, &self.layout, blocked);
+            }
+            let touched = Window { x: [changed.min[0], changed.max[0] + 1], y: [changed.min[1], changed.max[1] + 1] };
+            skip::mark(&mut field.codes, &self.layout, touched, skip::LOCAL_LEVELS);
+        }
+        (field, changed)
+    }
+}
+
+/// A box of voxels, both corners included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct VoxelBox {
+    pub min: [usize; 3],
+    pub max: [usize; 3],
+}
+
+impl VoxelBox {
+    /// Grows a box, or begins it, so that it holds `voxel`.
+    fn add(grown: &mut Option<Self>, voxel: [usize; 3]) {
+        let grown = grown.get_or_insert(Self { min: voxel, max: voxel });
+        for (axis, at) in voxel.into_iter().enumerate() {
+            grown.min[axis] = grown.min[axis].min(at);
+            grown.max[axis] = grown.max[axis].max(at);
+        }
+    }
+}
+
+/// The padded grid: an opaque voxel around the shelf, shared by neighbouring lines and planes, so that a ray that
+/// leaves the shelf anywhere but through its open front meets one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Layout {
+    pub grid: Grid,
+    /// Distance in the padded array between neighbours along x, y and z.
+    pub stride: [usize; 3],
+}
+
+impl Layout {
+    fn of(grid: &Grid) -> Self {
+        assert!(grid.dims.iter().all(|&n| n <= MOST_VOXELS), "at most {MOST_VOXELS} voxels along an axis");
+        let line = grid.dims[2] + 1;
+        Self { grid: *grid, stride: [(grid.dims[1] + 1) * line, line, 1] }
+    }
+
+    /// Number of padded voxels: a plane and a line before the first voxel, a plane after the last.
+    pub fn len(&self) -> usize {
+        (self.grid.dims[0] + 2) * self.stride[0] + self.stride[1]
+    }
+
+    /// Position of a voxel in the padded grid.
+    pub fn at(&self, voxel: [usize; 3]) -> usize {
+        (voxel[0] + 1) * self.stride[0] + (voxel[1] + 1) * self.stride[1] + voxel[2]
+    }
+
+    /// Position in the padded grid of the voxel at `index` in arrays over voxels.
+    pub fn padded(&self, index: usize) -> usize {
+        let voxel = self.grid.voxel(index);
+        self.at([voxel.x, voxel.y, voxel.z].map(usize::from))
+    }
+
+    /// Position in arrays over voxels of a voxel inside the shelf.
+    pub fn unpadded(&self, padded: usize) -> usize {
+        let at = padded - self.at([0, 0, 0]);
+        let (x, y, z) = (at / self.stride[0], at % self.stride[0] / self.stride[1], at % self.stride[1]);
+        (x * self.grid.dims[1] + y) * self.grid.dims[2] + z
+    }
+}

@@ -3,6 +3,16 @@
 //! Look (first view of IGV) if `IGV > IGM + gamma Reg`, else push; `Reg = min(0, H_s(belief) - H_s(predicted))` over the
 //! semantic map and `gamma = 1/5`. A [`Decision`] keeps everything that was weighed.
 
+mod decide;
+mod policy;
+mod rule;
+mod weigh;
+
+pub use decide::decide;
+pub use policy::PolicyKind;
+pub use rule::{PUSH_EVERY, QUIET_STEPS, SATURATION, look_or_push, push_guard, saturated};
+pub use weigh::{COARSE_VIEWS, disturbance};
+
 use crate::belief::{Belief, BeliefUpdate};
 use crate::camera::{ViewArray, ViewId};
 use crate::push::Rejection;
@@ -23,33 +33,6 @@ pub enum Action {
     },
     /// Push.
     Push(Push),
-}
-
-/// A rule that turns a belief and a history into the next action (`DESIGN.md` section 5).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PolicyKind {
-    /// The rule above.
-    Mem,
-    /// Best view, never a push.
-    MemNoPush,
-    /// Random views on the classical belief, never a push.
-    Random,
-    /// Random views on the network belief, never a push.
-    RandomCnabu,
-    /// Best views; a random push, predicted, every 5th step.
-    #[serde(rename = "random-push-5")]
-    RandomPush5,
-    /// Best views; a random push, not predicted, every 5th step.
-    #[serde(rename = "random-push-5-blind")]
-    RandomPush5Blind,
-    /// Random views; a random push, not predicted, every 5th step.
-    #[serde(rename = "random-view-push-5")]
-    RandomViewPush5,
-    /// Best views; a random push when two consecutive gains differ by less than 2 %.
-    Saturation,
-    /// Clairvoyant: the view whose real observation cuts the entropy most; never a push.
-    Oracle,
 }
 
 /// Why an action was chosen, in one of the planner's own cases.
@@ -89,7 +72,8 @@ pub struct CandidateRecord {
     /// Why it was not a candidate, if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rejection: Option<Rejection>,
-    /// Best single-view gain under the predicted belief, nats (coarse unless it is the winner); `None` if rejected.
+    /// Best single-view gain under the predicted belief, nats; `None` if rejected or not weighed. The best push's is
+    /// exact, the others' come from fewer views and rays and are scaled to the same number of rays.
     pub gain: Option<f32>,
     /// The view with that gain.
     pub view: Option<ViewId>,
@@ -137,6 +121,43 @@ pub struct History {
     pub dropped: bool,
 }
 
+impl Decision {
+    /// Gain of the best single view that was not used yet, nats.
+    pub fn best_gain(&self) -> Option<f32> {
+        self.pair.first().and_then(|view| self.gains.get(usize::from(view.0))).copied()
+    }
+}
+
+impl History {
+    /// Takes down that `decision.action` was done, and whether it dropped an object.
+    ///
+    /// A look uses its view up; a push clears the used views and, unless it dropped something, leaves the view that made
+    /// it worth it for the next step.
+    pub fn record(&mut self, decision: &Decision, dropped: bool) {
+        self.actions.push(decision.action);
+        self.dropped |= dropped;
+        self.view_of_push = None;
+        match decision.action {
+            Action::Look { view } => {
+                self.used_views.push(view);
+                self.best_gains.extend(decision.best_gain());
+            }
+            Action::Push(push) => {
+                self.used_views.clear();
+                if !dropped {
+                    let best = decision.best_push.and_then(|at| decision.candidates.get(at));
+                    self.view_of_push = best.filter(|best| best.push == push).and_then(|best| best.view);
+                }
+            }
+        }
+    }
+
+    /// Whether the last action was a push.
+    pub fn just_pushed(&self) -> bool {
+        matches!(self.actions.last(), Some(Action::Push(_)))
+    }
+}
+
 /// What a decision is made from.
 pub struct Situation<'a> {
     /// The belief before the step.
@@ -173,7 +194,7 @@ impl Default for PlannerSettings {
     }
 }
 
-/// Decides the next action.
-pub fn decide(_policy: PolicyKind, _settings: &PlannerSettings, _situation: &Situation<'_>) -> Decision {
-    todo!()
-}
+#[cfg(test)]
+mod measure;
+#[cfg(test)]
+mod tests;

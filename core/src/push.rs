@@ -1,13 +1,40 @@
 //! Push candidates under a belief: frontier, sampling, collision checks.
+//!
+//! The frontier is the first surely occupied voxel ([`CONFIDENT`]) seen from the shelf's entrance in each (x, z) column.
+//! A candidate starts [`STANDOFF_M`] before a random frontier point, at the tool's height [`TOOL_HEIGHT_M`] above the
+//! board, goes towards a random likely occupied voxel within [`REACH_M`] of the point, never back towards the entrance
+//! (that would pull objects over the edge), and is 50 to 150 mm long. It is feasible if the tool touches neither the
+//! shelf nor a confident voxel that is not the target's, all the way in and along the push; see [`Clearance`].
+
+mod clearance;
+mod frontier;
+
+pub use clearance::Clearance;
+pub use frontier::frontier;
 
 use crate::belief::{Belief, SweptPush};
 use crate::grid::Voxel;
 use crate::rng::ChaCha8Rng;
 use crate::tool::{Push, Tool};
+use frontier::likely_targets;
+use rand::Rng;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Occupancy probability from which a voxel is a high-confidence one.
 pub const CONFIDENT: f32 = 0.85;
+/// Occupancy probability from which a voxel is a likely one: more than a voxel that nothing is known of.
+pub const LIKELY: f32 = 0.6;
+/// How far before the frontier point the tip starts, metres.
+pub const STANDOFF_M: f32 = 0.02;
+/// Height of the tip above the board, metres.
+pub const TOOL_HEIGHT_M: f32 = 0.06;
+/// How far from the frontier point the voxel may be that gives the direction, metres.
+pub const REACH_M: f32 = 0.06;
+/// Shortest and longest push, metres.
+pub const LENGTH_M: [f32; 2] = [0.05, 0.15];
+/// At most this many frontier points are tried for each feasible candidate asked for.
+pub const DRAWS_PER_CANDIDATE: usize = 10;
 
 /// Why a candidate is no candidate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,14 +67,69 @@ pub struct Candidate {
     pub rejection: Option<Rejection>,
 }
 
-/// The first voxel with `p >= 0.85` seen from the shelf's entrance in every (x, z) column.
-pub fn frontier(_belief: &Belief) -> Vec<Voxel> {
-    todo!()
+/// Draws candidates until `count` of them are feasible, and returns all of them, rejected ones too, in the order drawn.
+///
+/// Frontier points are drawn without replacement. Drawing ends early when there are no more of them or after
+/// [`DRAWS_PER_CANDIDATE`] times `count`, so that there may be fewer feasible candidates than asked for, or none. The
+/// result depends on the belief and on the stream alone, not on the number of threads.
+pub fn sample(belief: &Belief, tool: &Tool, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
+    /// Draws that are checked together; fixed, so that it never matters who checks them.
+    const BATCH: usize = 32;
+    let clearance = Clearance::new(belief);
+    let mut points = frontier(belief);
+    let draws = points.len().min(count * DRAWS_PER_CANDIDATE);
+    let mut candidates = Vec::new();
+    let mut feasible = 0;
+    for first in (0..draws).step_by(BATCH) {
+        if feasible == count {
+            break;
+        }
+        let drawn: Vec<(Voxel, Option<Push>)> = (first..draws.min(first + BATCH))
+            .map(|i| {
+                let j = rng.random_range(i..points.len());
+                points.swap(i, j);
+                (points[i], draw_push(belief, points[i], rng))
+            })
+            .collect();
+        let checked: Vec<Candidate> =
+            drawn.into_par_iter().map(|(point, push)| candidate(belief, tool, &clearance, point, push)).collect();
+        for candidate in checked {
+            if feasible < count {
+                feasible += usize::from(candidate.rejection.is_none());
+                candidates.push(candidate);
+            }
+        }
+    }
+    candidates
 }
 
-/// Draws `count` candidates, feasible and rejected ones, in the order drawn.
-pub fn sample(_belief: &Belief, _tool: &Tool, _count: usize, _rng: &mut ChaCha8Rng) -> Vec<Candidate> {
-    todo!()
+/// Where a push from a frontier point starts: before the point, at the tool's height.
+fn start_of(belief: &Belief, frontier: Voxel) -> [f32; 3] {
+    let point = belief.grid.center(frontier);
+    [point.x, point.y - STANDOFF_M, belief.grid.origin[2] + TOOL_HEIGHT_M]
 }
 
-const _: Option<Push> = None;
+/// A push from a frontier point towards something likely; `None` when nothing likely is near. Always draws as much.
+fn draw_push(belief: &Belief, frontier: Voxel, rng: &mut ChaCha8Rng) -> Option<Push> {
+    let (which, length_m) = (rng.random::<f64>(), rng.random_range(LENGTH_M[0]..LENGTH_M[1]));
+    let start = start_of(belief, frontier);
+    let targets = likely_targets(belief, frontier, start[1]);
+    let target = belief.grid.center(*targets.get((which * targets.len() as f64) as usize)?);
+    let direction_deg = (target.y - start[1]).atan2(target.x - start[0]).to_degrees();
+    Some(Push { start, direction_deg, length_m })
+}
+
+/// Checks a drawn push. One without a target is kept as the straight push that it would have been.
+fn candidate(belief: &Belief, tool: &Tool, clearance: &Clearance, frontier: Voxel, push: Option<Push>) -> Candidate {
+    let aimless = Push { start: start_of(belief, frontier), direction_deg: 90.0, length_m: LENGTH_M[0] };
+    let straight = push.unwrap_or(aimless);
+    let swept = tool.swept_volume(&straight, &belief.grid);
+    let rejection = match push {
+        None => Some(Rejection::NoTarget),
+        Some(push) => clearance.check(tool, &push, &swept, &clearance.target(frontier)),
+    };
+    Candidate { frontier, swept: SweptPush { push: straight, swept }, rejection }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,130 @@
+//! From a situation to the next action.
+
+use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated};
+use super::weigh::{Weighed, random_push, weigh_pushes};
+use super::{Action, Decision, PlannerSettings, PolicyKind, Reason, Situation};
+use crate::camera::ViewId;
+use crate::gain::{GainField, RayDensity, best_pair, gain_of_views};
+use crate::rng::stream;
+use rand::Rng;
+use rayon::prelude::*;
+
+/// Decides the next action: the same situation decides the same, on any number of threads.
+///
+/// Gains of all views and the best pair are weighed whatever the policy makes of them, so that decisions of different
+/// policies compare. Pushes are drawn and predicted only where the policy may push now.
+pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situation<'_>) -> Decision {
+    let (history, views) = (situation.history, situation.views);
+    let step = history.actions.len();
+    let field = GainField::new(situation.belief);
+    let ids: Vec<ViewId> = views.views.iter().map(|view| view.id).collect();
+    let gains = gain_of_views(&field, views, &ids, RayDensity::FULL);
+    let mut fresh = gains.clone();
+    for view in &history.used_views {
+        fresh[usize::from(view.0)] = 0.0;
+    }
+    let pair = best_pair(&field, views, &fresh, RayDensity::FULL);
+    let best_look = pair.map_or_else(|| fallback_view(situation), |pair| pair.first);
+    let mut decision = Decision {
+        action: Action::Look { view: best_look },
+        reason: Reason::Schedule,
+        igv: pair.map_or(0.0, |pair| pair.total()),
+        igm: 0.0,
+        reg: 0.0,
+        pair: pair.map_or_else(Vec::new, |pair| std::iter::once(pair.first).chain(pair.second).collect()),
+        gains,
+        candidates: Vec::new(),
+        best_push: None,
+    };
+    let guard = || push_guard(history, situation.budget, situation.belief.is_complete());
+    match policy {
+        PolicyKind::Mem => {
+            if let (true, Some(view)) = (history.just_pushed(), history.view_of_push) {
+                decision.action = Action::Look { view };
+                decision.reason = Reason::ViewOfPush;
+            } else if let Some(reason) = guard() {
+                decision.reason = reason;
+            } else {
+                let weighed = weigh_pushes(settings, situation, &field);
+                choose(&mut decision, weighed, settings.gamma);
+            }
+        }
+        PolicyKind::MemNoPush => (),
+        PolicyKind::Random | PolicyKind::RandomCnabu => decision.action = random_look(situation),
+        PolicyKind::RandomPush5 | PolicyKind::RandomPush5Blind | PolicyKind::RandomViewPush5 => {
+            if policy == PolicyKind::RandomViewPush5 {
+                decision.action = random_look(situation);
+            }
+            if (step + 1).is_multiple_of(PUSH_EVERY) {
+                push_at_random(&mut decision, situation, guard());
+            }
+        }
+        PolicyKind::Saturation => {
+            let previous = history.best_gains.last().copied();
+            if previous.is_some_and(|previous| saturated(previous, decision.best_gain().unwrap_or(0.0))) {
+                push_at_random(&mut decision, situation, guard());
+            }
+        }
+        PolicyKind::Oracle => decision.action = clairvoyant_look(situation),
+    }
+    decision
+}
+
+/// Applies the rule to what was weighed.
+fn choose(decision: &mut Decision, weighed: Weighed, gamma: f32) {
+    decision.candidates = weighed.candidates;
+    decision.best_push = weighed.best;
+    let Some(best) = weighed.best.map(|at| &decision.candidates[at]) else {
+        decision.reason = Reason::NoCandidate;
+        return;
+    };
+    decision.igm = best.gain.unwrap_or(0.0);
+    decision.reg = best.reg.unwrap_or(0.0);
+    decision.reason = look_or_push(decision.igv, decision.igm, decision.reg, gamma);
+    if decision.reason == Reason::PushTellsMore {
+        decision.action = Action::Push(best.push);
+    }
+}
+
+/// Replaces the look by a random feasible push, if nothing forbids it and there is one.
+fn push_at_random(decision: &mut Decision, situation: &Situation<'_>, guard: Option<Reason>) {
+    if let Some(reason) = guard {
+        decision.reason = reason;
+        return;
+    }
+    let drawn = random_push(situation);
+    decision.candidates = drawn.candidates;
+    decision.best_push = drawn.best;
+    match drawn.best {
+        Some(at) => decision.action = Action::Push(decision.candidates[at].push),
+        None => decision.reason = Reason::NoCandidate,
+    }
+}
+
+/// Views that were not used since the last push; all of them once every one was.
+fn unused_views(situation: &Situation<'_>) -> Vec<ViewId> {
+    let all = situation.views.views.iter().map(|view| view.id);
+    let unused: Vec<ViewId> = all.clone().filter(|view| !situation.history.used_views.contains(view)).collect();
+    if unused.is_empty() { all.collect() } else { unused }
+}
+
+/// Where to look when no unused view promises anything: the first unused one.
+fn fallback_view(situation: &Situation<'_>) -> ViewId {
+    unused_views(situation).first().copied().unwrap_or(ViewId(0))
+}
+
+/// An unused view, each as likely as the other.
+fn random_look(situation: &Situation<'_>) -> Action {
+    let unused = unused_views(situation);
+    let mut rng = stream(situation.seed, "views", situation.history.actions.len() as u64);
+    let view = unused.get(rng.random_range(0..unused.len().max(1))).copied().unwrap_or(ViewId(0));
+    Action::Look { view }
+}
+
+/// The unused view whose real observation leaves the map with the least entropy, the first of equals.
+fn clairvoyant_look(situation: &Situation<'_>) -> Action {
+    let unused = unused_views(situation);
+    let entropies: Vec<f64> = unused.par_iter().map(|&view| (situation.really_look)(view).entropy()).collect();
+    let best = (0..unused.len()).min_by(|&a, &b| entropies[a].total_cmp(&entropies[b]));
+    Action::Look { view: best.map_or(ViewId(0), |at| unused[at]) }
+}

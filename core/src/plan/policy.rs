@@ -1,0 +1,125 @@
+//! The policies by name, and what each of them stands for.
+
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
+
+/// A rule that turns a belief and a history into the next action (`DESIGN.md` section 5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PolicyKind {
+    /// The rule above.
+    Mem,
+    /// Best view, never a push.
+    MemNoPush,
+    /// Random views on the classical belief, never a push.
+    Random,
+    /// Random views on the network belief, never a push.
+    RandomCnabu,
+    /// Best views; a random push, predicted, every 5th step.
+    #[serde(rename = "random-push-5")]
+    RandomPush5,
+    /// Best views; a random push, not predicted, every 5th step.
+    #[serde(rename = "random-push-5-blind")]
+    RandomPush5Blind,
+    /// Random views; a random push, not predicted, every 5th step.
+    #[serde(rename = "random-view-push-5")]
+    RandomViewPush5,
+    /// Best views; a random push when two consecutive gains differ by less than 2 %.
+    Saturation,
+    /// Clairvoyant: the view whose real observation cuts the entropy most; never a push.
+    Oracle,
+}
+
+impl PolicyKind {
+    /// Every policy, in the order of the method's table.
+    pub const ALL: [Self; 9] = [
+        Self::Mem,
+        Self::MemNoPush,
+        Self::RandomCnabu,
+        Self::Random,
+        Self::RandomPush5,
+        Self::RandomPush5Blind,
+        Self::RandomViewPush5,
+        Self::Saturation,
+        Self::Oracle,
+    ];
+
+    /// Its name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mem => "mem",
+            Self::MemNoPush => "mem-no-push",
+            Self::RandomCnabu => "random-cnabu",
+            Self::Random => "random",
+            Self::RandomPush5 => "random-push-5",
+            Self::RandomPush5Blind => "random-push-5-blind",
+            Self::RandomViewPush5 => "random-view-push-5",
+            Self::Saturation => "saturation",
+            Self::Oracle => "oracle",
+        }
+    }
+
+    /// Whether a push is predicted into the belief (sigma_m) or leaves it as it is until the next look.
+    pub fn predicts_pushes(self) -> bool {
+        !matches!(self, Self::RandomPush5Blind | Self::RandomViewPush5)
+    }
+
+    /// Name of the belief update that the policy is published with.
+    pub fn default_belief(self) -> &'static str {
+        match self {
+            Self::Random => "classical",
+            _ => "cnabu",
+        }
+    }
+}
+
+impl fmt::Display for PolicyKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for PolicyKind {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|policy| policy.name() == name).ok_or_else(|| {
+            let known: Vec<&str> = Self::ALL.iter().map(|policy| policy.name()).collect();
+            Error::Usage(format!("unknown policy \"{name}\"; there are {}", known.join(", ")))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_the_same_on_the_command_line_and_in_files() {
+        for policy in PolicyKind::ALL {
+            assert_eq!(policy.to_string().parse::<PolicyKind>().expect("its own name"), policy);
+            assert_eq!(serde_json::to_string(&policy).expect("json"), format!("\"{policy}\""));
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_is_answered_with_the_known_ones() {
+        let error = "mems".parse::<PolicyKind>().expect_err("unknown");
+        assert_eq!(error.exit_code(), 2);
+        let message = error.to_string();
+        assert!(message.contains("\"mems\""), "{message}");
+        assert!(PolicyKind::ALL.iter().all(|policy| message.contains(policy.name())), "{message}");
+        assert!(!message.contains('\n'));
+    }
+
+    #[test]
+    fn what_the_table_says_of_beliefs() {
+        let blind: Vec<PolicyKind> = PolicyKind::ALL.into_iter().filter(|policy| !policy.predicts_pushes()).collect();
+        assert_eq!(blind, [PolicyKind::RandomPush5Blind, PolicyKind::RandomViewPush5]);
+        let classical: Vec<PolicyKind> =
+            PolicyKind::ALL.into_iter().filter(|policy| policy.default_belief() == "classical").collect();
+        assert_eq!(classical, [PolicyKind::Random]);
+    }
+}

@@ -1,0 +1,94 @@
+//! The rule and its guards, as functions of plain numbers.
+
+use super::{History, Reason};
+
+/// The first steps, in which nothing is pushed: the map is still too empty to push by.
+pub const QUIET_STEPS: usize = 3;
+/// The scheduled policies push at every step whose number, counted from 1, is a multiple of this.
+pub const PUSH_EVERY: usize = 5;
+/// Relative difference of two consecutive best gains below which looking is saturated.
+pub const SATURATION: f32 = 0.02;
+
+/// The rule: look if `IGV > IGM + gamma Reg`, else push.
+///
+/// `reg` is at most 0, so a push that blurs what is known of the labels has to promise more.
+pub fn look_or_push(igv: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
+    if igv > igm + gamma * reg { Reason::LookTellsMore } else { Reason::PushTellsMore }
+}
+
+/// Why no push is allowed in the next step, or `None` if one is. Of several reasons the lasting ones are named first.
+pub fn push_guard(history: &History, budget: usize, map_complete: bool) -> Option<Reason> {
+    let step = history.actions.len();
+    let guards = [
+        (history.dropped, Reason::Dropped),
+        (map_complete, Reason::MapComplete),
+        (step < QUIET_STEPS, Reason::TooEarly),
+        (history.just_pushed(), Reason::JustPushed),
+        (step + 1 >= budget, Reason::LastStep),
+    ];
+    guards.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
+}
+
+/// Whether looking no longer gets better or worse: two consecutive best gains differ by less than [`SATURATION`] of the
+/// larger one.
+pub fn saturated(previous: f32, current: f32) -> bool {
+    let larger = previous.max(current);
+    larger <= 0.0 || (current - previous).abs() < SATURATION * larger
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::ViewId;
+    use crate::plan::Action;
+    use crate::tool::Push;
+
+    const LOOK: Action = Action::Look { view: ViewId(0) };
+    const PUSH: Action = Action::Push(Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 });
+
+    fn after(actions: &[Action]) -> History {
+        History { actions: actions.to_vec(), ..History::default() }
+    }
+
+    #[test]
+    fn the_rule_on_hand_made_numbers() {
+        assert_eq!(look_or_push(100.0, 90.0, 0.0, 0.2), Reason::LookTellsMore);
+        assert_eq!(look_or_push(90.0, 100.0, 0.0, 0.2), Reason::PushTellsMore);
+        assert_eq!(look_or_push(100.0, 100.0, 0.0, 0.2), Reason::PushTellsMore, "looking has to be better");
+        // 90 > 100 + 0.2 * -60 = 88: the disturbance turns the choice.
+        assert_eq!(look_or_push(90.0, 100.0, -60.0, 0.2), Reason::LookTellsMore);
+        assert_eq!(look_or_push(90.0, 100.0, -60.0, 0.1), Reason::PushTellsMore);
+        assert_eq!(look_or_push(90.0, 100.0, -40.0, 0.2), Reason::PushTellsMore);
+    }
+
+    #[test]
+    fn no_push_in_the_first_three_steps_and_none_in_the_last() {
+        for step in 0..3 {
+            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false), Some(Reason::TooEarly));
+        }
+        for step in 3..19 {
+            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false), None);
+        }
+        assert_eq!(push_guard(&after(&[LOOK; 19]), 20, false), Some(Reason::LastStep));
+    }
+
+    #[test]
+    fn no_push_twice_in_a_row() {
+        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH]), 20, false), Some(Reason::JustPushed));
+        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH, LOOK]), 20, false), None);
+    }
+
+    #[test]
+    fn no_push_on_a_complete_map_nor_after_a_drop() {
+        assert_eq!(push_guard(&after(&[LOOK; 5]), 20, true), Some(Reason::MapComplete));
+        let dropped = History { dropped: true, ..after(&[LOOK; 5]) };
+        assert_eq!(push_guard(&dropped, 20, false), Some(Reason::Dropped));
+        assert_eq!(push_guard(&dropped, 20, true), Some(Reason::Dropped), "the lasting reason is named");
+    }
+
+    #[test]
+    fn saturation_is_two_percent() {
+        assert!(saturated(100.0, 98.5) && saturated(98.5, 100.0) && saturated(0.0, 0.0));
+        assert!(!saturated(100.0, 97.0) && !saturated(97.0, 100.0) && !saturated(0.0, 1.0));
+    }
+}

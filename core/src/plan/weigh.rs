@@ -1,0 +1,95 @@
+//! What pushes are worth: IGM and Reg of every candidate.
+
+use super::{CandidateRecord, PlannerSettings, Situation};
+use crate::belief::{Belief, PushPrediction, SweptPush};
+use crate::camera::ViewId;
+use crate::gain::{GainField, RayDensity, RayGains, gain_of_views};
+use crate::push::{Candidate, sample};
+use crate::rng::{ChaCha8Rng, stream};
+
+/// About how many views rank the candidates: every 5th of 300, all of an array that has fewer than twice as many.
+pub const COARSE_VIEWS: usize = 60;
+/// Pushes that are predicted together: enough to fill a batch and the threads, few enough to fit into memory.
+const BATCH: usize = 16;
+
+/// The pushes that were weighed.
+pub(super) struct Weighed {
+    pub candidates: Vec<CandidateRecord>,
+    /// Position of the push with the largest gain; `None` when no candidate is feasible.
+    pub best: Option<usize>,
+}
+
+/// `Reg = min(0, H_s(belief) - H_s(predicted))`, nats.
+pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
+    prediction.semantic_entropy_drop(belief).min(0.0) as f32
+}
+
+/// Draws candidates and weighs the feasible ones: a coarse ranking first, then the winner with all views and rays.
+///
+/// A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones. A push clears the
+/// list of used views, so every view counts.
+pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
+    let (belief, update, views) = (situation.belief, situation.update, situation.views);
+    let drawn = sample(belief, situation.tool, settings.candidates, &mut push_stream(situation));
+    let mut candidates: Vec<CandidateRecord> = drawn.iter().map(record_of).collect();
+    let (feasible, pushes): (Vec<usize>, Vec<SweptPush>) = drawn
+        .into_iter()
+        .enumerate()
+        .filter(|(_, candidate)| candidate.rejection.is_none())
+        .map(|(at, candidate)| (at, candidate.swept))
+        .unzip();
+
+    let ids = |step: usize| views.views.iter().step_by(step).map(|view| view.id).collect::<Vec<ViewId>>();
+    let coarse = ids((views.views.len() / COARSE_VIEWS).max(1));
+    let scale = (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2);
+    let rays = RayGains::new(field, views, &coarse, RayDensity::COARSE);
+    let mut best: Option<usize> = None;
+    for (pushes, places) in pushes.chunks(BATCH).zip(feasible.chunks(BATCH)) {
+        let predictions = update.predict_pushes(belief, pushes);
+        let gains = rays.under_each(&predictions);
+        for ((prediction, gains), &at) in predictions.iter().zip(&gains).zip(places) {
+            let (view, gain) = best_view(&coarse, gains);
+            candidates[at].gain = Some(gain * scale);
+            candidates[at].view = view;
+            candidates[at].reg = Some(disturbance(belief, prediction));
+            if best.is_none_or(|best| candidates[at].gain > candidates[best].gain) {
+                best = Some(at);
+            }
+        }
+    }
+    if let Some(at) = best {
+        let winner = feasible.iter().position(|&place| place == at).map(|i| &pushes[i..=i]).unwrap_or_default();
+        for prediction in update.predict_pushes(belief, winner) {
+            let (field, all) = (field.with_prediction(&prediction), ids(1));
+            let (view, gain) = best_view(&all, &gain_of_views(&field, views, &all, RayDensity::FULL));
+            candidates[at].gain = Some(gain);
+            candidates[at].view = view;
+        }
+    }
+    Weighed { candidates, best }
+}
+
+/// Draws one feasible push at random, with those that were rejected on the way.
+pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
+    let candidates: Vec<CandidateRecord> =
+        sample(situation.belief, situation.tool, 1, &mut push_stream(situation)).iter().map(record_of).collect();
+    let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
+    Weighed { candidates, best }
+}
+
+fn push_stream(situation: &Situation<'_>) -> ChaCha8Rng {
+    stream(situation.seed, "pushes", situation.history.actions.len() as u64)
+}
+
+fn record_of(candidate: &Candidate) -> CandidateRecord {
+    let rejection = candidate.rejection.clone();
+    CandidateRecord { push: candidate.swept.push, rejection, gain: None, view: None, reg: None }
+}
+
+/// The view with the largest gain, the first of equals, and that gain; no view and 0 without views.
+fn best_view(ids: &[ViewId], gains: &[f32]) -> (Option<ViewId>, f32) {
+    let better = |best: (Option<ViewId>, f32), (&id, &gain): (&ViewId, &f32)| {
+        if best.0.is_none() || gain > best.1 { (Some(id), gain) } else { best }
+    };
+    ids.iter().zip(gains).fold((None, 0.0), better)
+}

@@ -1,5 +1,21 @@
-//! Scores of a belief against the truth: IoU, mIoU, calibration, object verdicts.
+//! Scores of a belief against the truth: IoU, mIoU, calibration, entropy, object verdicts (`DESIGN.md` section 6).
+//!
+//! Everything is counted in the scored volume, the grid below [`SCORED_HEIGHT_M`], so that the empty air above does not
+//! flatter. [`Scores::of`] judges one belief; a [`Tally`] keeps the counts behind the scores, and tallies merged over a
+//! set of scenes give the set's scores from one confusion matrix. [`object_verdicts`] says what became of each object.
 
+mod confusion;
+mod objects;
+mod reliability;
+mod tally;
+
+pub use confusion::Confusion;
+pub use objects::{SPECK_M2, object_verdicts};
+pub use reliability::{BIN_COUNT, Reliability, ReliabilityBin};
+pub use tally::Tally;
+
+use crate::belief::Belief;
+use crate::world::TruthMap;
 use serde::{Deserialize, Serialize};
 
 /// The scored volume is the grid below this height (the tallest class and a margin), metres.
@@ -20,6 +36,15 @@ pub struct Scores {
     pub mece_occupancy: f64,
     /// Expected calibration error of semantics, mean over the true classes.
     pub mece_semantics: f64,
+}
+
+impl Scores {
+    /// The scores of `belief` against `truth`, which must cover the same grid.
+    ///
+    /// Runs in parallel; the result does not depend on the number of threads.
+    pub fn of(belief: &Belief, truth: &TruthMap) -> Self {
+        Tally::of(belief, truth).scores()
+    }
 }
 
 /// What became of an object in the belief.

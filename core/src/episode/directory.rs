@@ -1,0 +1,338 @@
+//! The directory of an episode, written step by step.
+//!
+//! ```text
+//! episode.json        what was decided, done and scored; the index of everything else
+//! beliefs/NNN.npz     the belief after NNN actions, 000 the prior
+//! truth/NNN.npz       the truth at the start (000) and after every push
+//! episode.rrd, summary.png, notes.json      written by others, removed with the episode they belong to
+//! ```
+//!
+//! Every file is there whole or not at all, and `episode.json` is renamed last: what it tells of is there. A run that
+//! is killed at any moment leaves a directory that opens and resumes, or, before its first `episode.json`, one that a
+//! new run may start in.
+
+use super::files::{TEMPORARY, names_in, remove_if_there, write_atomically};
+use super::machine::Episode;
+use super::npz::{self, Precision, StoredTruth};
+use super::record::EpisodeRecord;
+use crate::belief::Belief;
+use crate::grid::Grid;
+use crate::world::TruthMap;
+use crate::{Error, Result};
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::time::Instant;
+
+const DOCUMENT: &str = "episode.json";
+const BELIEFS: &str = "beliefs";
+const TRUTH: &str = "truth";
+/// Files of an episode that other parts write.
+const COMPANIONS: [&str; 3] = ["episode.rrd", "summary.png", "notes.json"];
+
+/// What to do with an episode that is already there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overwrite {
+    /// Refuse.
+    Refuse,
+    /// Remove the old episode's files, and no others, and start anew.
+    Replace,
+}
+
+/// What a path holds, seen by someone who wants to write an episode there.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DirectoryState {
+    /// Nothing: no directory, or an empty one.
+    Free,
+    /// The first files of a run that was stopped before its first `episode.json`: as good as free.
+    Begun,
+    /// An episode.
+    Episode,
+    /// Files of an episode without its `episode.json`.
+    Unindexed,
+    /// Something else; the name of a file or directory that is no episode's.
+    Foreign(String),
+}
+
+/// The directory of an episode: [`create`](Self::create) to write one, [`open`](Self::open) to read one.
+#[derive(Debug)]
+pub struct EpisodeDir {
+    path: PathBuf,
+    precision: Precision,
+    grid: OnceLock<Grid>,
+    /// Held while this process writes here.
+    lock: Option<File>,
+}
+
+impl EpisodeDir {
+    /// What `path` holds.
+    pub fn state(path: impl AsRef<Path>) -> Result<DirectoryState> {
+        let path = path.as_ref();
+        if path.exists() && !path.is_dir() {
+            return Err(Error::input(path, "", "is a file, not a directory"));
+        }
+        let names = names_in(path)?;
+        let numbered = numbered_files(path)?;
+        let is_known = |name: &str| {
+            [DOCUMENT, BELIEFS, TRUTH].contains(&name) || COMPANIONS.contains(&name) || name.starts_with(TEMPORARY)
+        };
+        if names.iter().any(|name| name == DOCUMENT) {
+            let is_ours = is_document(&path.join(DOCUMENT))? || !numbered.is_empty();
+            return Ok(if is_ours { DirectoryState::Episode } else { DirectoryState::Foreign(DOCUMENT.to_owned()) });
+        }
+        let stranger = names.iter().find(|name| !is_known(name) || *name == "notes.json");
+        if let Some(stranger) = stranger.cloned().or(stranger_inside(path)?) {
+            return Ok(DirectoryState::Foreign(stranger));
+        }
+        Ok(if names.is_empty() {
+            DirectoryState::Free
+        } else if numbered.iter().all(|(_, index)| *index == 0) {
+            DirectoryState::Begun
+        } else {
+            DirectoryState::Unindexed
+        })
+    }
+
+    /// Prepares `path` for a new episode, and makes the directory if need be. Refuses a directory that holds anything
+    /// but an episode, and an episode unless it may be replaced. Only files of an episode are ever removed.
+    pub fn create(path: impl AsRef<Path>, overwrite: Overwrite) -> Result<Self> {
+        let path = path.as_ref();
+        match Self::state(path)? {
+            DirectoryState::Free | DirectoryState::Begun => {}
+            DirectoryState::Foreign(name) => {
+                let message = format!("is not empty and holds no episode (there is {name}): choose another directory");
+                return Err(Error::input(path, "", message));
+            }
+            DirectoryState::Episode | DirectoryState::Unindexed if overwrite == Overwrite::Replace => {}
+            DirectoryState::Episode => {
+                let message = "holds an episode: --resume goes on with it, --force replaces it";
+                return Err(Error::input(path, "", message));
+            }
+            DirectoryState::Unindexed => {
+                let message = "holds beliefs without their episode.json: --force replaces them";
+                return Err(Error::input(path, "", message));
+            }
+        }
+        fs::create_dir_all(path).map_err(|error| Error::io(path, error))?;
+        let directory = Self::at(path, lock(path)?);
+        directory.remove_episode()?;
+        for part in [BELIEFS, TRUTH] {
+            let part = path.join(part);
+            fs::create_dir_all(&part).map_err(|error| Error::io(&part, error))?;
+        }
+        Ok(directory)
+    }
+
+    /// Keeps beliefs with the given precision; float16 unless told.
+    pub fn with_precision(mut self, precision: Precision) -> Self {
+        self.precision = precision;
+        self
+    }
+
+    /// Opens an episode for reading, also one that is still being written. Checks that `episode.json` is well-formed
+    /// and that every file it tells of is a whole archive; leftovers of a killed run are removed.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let directory = Self::at(path, None);
+        let record = directory.record()?;
+        for index in 0..=record.steps.len() {
+            npz::check_archive(&directory.belief_path(index), &["occupancy", "semantics"])?;
+        }
+        for index in record.truth_indices() {
+            npz::check_archive(&directory.truth_path(index), &["occupancy", "labels"])?;
+        }
+        // A leftover is stale only if nobody is writing; a directory that cannot be written keeps its leftovers.
+        if let Ok(Some(_writing)) = lock(path) {
+            let _ = directory.remove_leftovers();
+        }
+        Ok(directory)
+    }
+
+    /// Opens an episode to go on writing: no other run may be writing it. Files beyond the last step told of in
+    /// `episode.json` are removed.
+    pub(super) fn open_to_write(path: &Path) -> Result<Self> {
+        let mut directory = Self::open(path)?;
+        directory.lock = lock(path)?;
+        directory.remove_leftovers()?;
+        let steps = directory.record()?.steps.len();
+        for (part, index) in numbered_files(path)?.into_iter().filter(|(_, index)| *index > steps) {
+            remove_if_there(&path.join(part).join(file_name(index)))?;
+        }
+        directory.precision = directory.read_belief_as_kept(0)?.1;
+        Ok(directory)
+    }
+
+    fn at(path: &Path, lock: Option<File>) -> Self {
+        Self { path: path.to_owned(), precision: Precision::default(), grid: OnceLock::new(), lock }
+    }
+
+    /// The directory's path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes what the last action brought: the belief, after a push the truth, and then `episode.json`. Before the
+    /// first action it writes the prior. To be called once after [`Episode::new`] and after every [`Episode::act`].
+    ///
+    /// The time it takes is added to the step's `record` seconds, but for the writing of `episode.json` itself.
+    pub fn write(&mut self, episode: &mut Episode) -> Result<()> {
+        let started = Instant::now();
+        let index = episode.record().steps.len();
+        let has_new_truth = episode.record().truth_index(index) == index;
+        self.write_arrays(index, episode.belief(), has_new_truth.then(|| episode.truth()))?;
+        episode.add_record_seconds(started.elapsed().as_secs_f64());
+        self.write_document(episode.record())
+    }
+
+    pub(super) fn write_arrays(&self, index: usize, belief: &Belief, truth: Option<&TruthMap>) -> Result<()> {
+        write_atomically(&self.belief_path(index), &npz::belief_archive(belief, self.precision))?;
+        match truth {
+            Some(truth) => write_atomically(&self.truth_path(index), &npz::truth_archive(truth)),
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn write_document(&self, record: &EpisodeRecord) -> Result<()> {
+        write_atomically(&self.path.join(DOCUMENT), record.to_json().as_bytes())
+    }
+
+    /// Reads `episode.json` as it is now.
+    pub fn record(&self) -> Result<EpisodeRecord> {
+        let path = self.path.join(DOCUMENT);
+        let text = match fs::read(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound && self.path.is_dir() => {
+                return Err(Error::input(&self.path, "", "holds no episode (no episode.json)"));
+            }
+            read => read.map_err(|error| Error::io(&path, error))?,
+        };
+        let text = String::from_utf8(text).map_err(|error| {
+            let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+            let line = 1 + good.iter().filter(|byte| **byte == b'\n').count();
+            Error::input(&path, format!("line {line}"), "is not UTF-8")
+        })?;
+        let record = EpisodeRecord::from_json(&text, &path)?;
+        let _ = self.grid.set(record.scene.grid());
+        Ok(record)
+    }
+
+    /// The belief after `actions` actions (0 is the prior), as exactly as it was kept.
+    pub fn read_belief(&self, actions: usize) -> Result<Belief> {
+        Ok(self.read_belief_as_kept(actions)?.0)
+    }
+
+    pub(super) fn read_belief_as_kept(&self, actions: usize) -> Result<(Belief, Precision)> {
+        let path = self.belief_path(actions);
+        let bytes = fs::read(&path).map_err(|error| Error::io(&path, error))?;
+        npz::read_belief(&bytes, &path, self.grid()?)
+    }
+
+    /// The truth that holds after `actions` actions: the one filed at the last push until then, or at the start.
+    pub fn read_truth(&self, actions: usize) -> Result<StoredTruth> {
+        let filed = numbered_files(&self.path)?;
+        let latest = filed.iter().filter(|(part, index)| *part == TRUTH && *index <= actions).map(|(_, index)| *index);
+        let path = self.truth_path(latest.max().unwrap_or(0));
+        let bytes = fs::read(&path).map_err(|error| Error::io(&path, error))?;
+        npz::read_truth(&bytes, &path, self.grid()?)
+    }
+
+    /// Path of the belief after `actions` actions.
+    pub fn belief_path(&self, actions: usize) -> PathBuf {
+        self.path.join(BELIEFS).join(file_name(actions))
+    }
+
+    /// Path of the truth that is filed after `actions` actions, if there is one.
+    pub fn truth_path(&self, actions: usize) -> PathBuf {
+        self.path.join(TRUTH).join(file_name(actions))
+    }
+
+    fn grid(&self) -> Result<Grid> {
+        if self.grid.get().is_none() {
+            self.record()?;
+        }
+        Ok(*self.grid.get().expect("reading the record sets the grid"))
+    }
+
+    fn remove_leftovers(&self) -> Result<()> {
+        for part in [self.path.clone(), self.path.join(BELIEFS), self.path.join(TRUTH)] {
+            for name in names_in(&part)?.iter().filter(|name| name.starts_with(TEMPORARY)) {
+                remove_if_there(&part.join(name))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes the files of an episode, `episode.json` first so that a half-removed one does not pass for whole.
+    fn remove_episode(&self) -> Result<()> {
+        remove_if_there(&self.path.join(DOCUMENT))?;
+        for name in COMPANIONS {
+            remove_if_there(&self.path.join(name))?;
+        }
+        // From the last to the first: what a kill leaves is taken for what it is.
+        let mut numbered = numbered_files(&self.path)?;
+        numbered.sort_by_key(|(_, index)| std::cmp::Reverse(*index));
+        for (part, index) in numbered {
+            remove_if_there(&self.path.join(part).join(file_name(index)))?;
+        }
+        self.remove_leftovers()
+    }
+}
+
+fn file_name(index: usize) -> String {
+    format!("{index:03}.npz")
+}
+
+/// The numbered archives in `beliefs/` and `truth/`.
+fn numbered_files(path: &Path) -> Result<Vec<(&'static str, usize)>> {
+    let mut found = Vec::new();
+    for part in [BELIEFS, TRUTH] {
+        let directory = path.join(part);
+        if directory.is_dir() {
+            found.extend(names_in(&directory)?.iter().filter_map(|name| index_of(name)).map(|index| (part, index)));
+        }
+    }
+    Ok(found)
+}
+
+/// The number in a name that [`file_name`] made.
+fn index_of(name: &str) -> Option<usize> {
+    let index = name.strip_suffix(".npz")?.parse().ok()?;
+    (file_name(index) == name).then_some(index)
+}
+
+/// The name of something in `beliefs/` or `truth/` that is no episode's.
+fn stranger_inside(path: &Path) -> Result<Option<String>> {
+    for part in [BELIEFS, TRUTH] {
+        let directory = path.join(part);
+        if directory.exists() && !directory.is_dir() {
+            return Ok(Some(part.to_owned()));
+        }
+        let names = names_in(&directory)?;
+        let stranger = names.iter().find(|name| index_of(name).is_none() && !name.starts_with(TEMPORARY));
+        if let Some(name) = stranger {
+            return Ok(Some(format!("{part}/{name}")));
+        }
+    }
+    Ok(None)
+}
+
+/// Whether the file has the members of an episode document, whatever their values.
+fn is_document(path: &Path) -> Result<bool> {
+    let text = fs::read(path).map_err(|error| Error::io(path, error))?;
+    let document: Option<serde_json::Map<String, serde_json::Value>> = serde_json::from_slice(&text).ok();
+    Ok(document.is_some_and(|members| ["format", "scene", "steps"].iter().all(|key| members.contains_key(*key))))
+}
+
+/// Takes the right to write in a directory until the handle is dropped or the process ends. `None` where the system
+/// cannot lock directories: then nobody is kept out.
+fn lock(path: &Path) -> Result<Option<File>> {
+    let Ok(handle) = File::open(path) else { return Ok(None) };
+    match handle.try_lock() {
+        Ok(()) => Ok(Some(handle)),
+        Err(TryLockError::WouldBlock) => Err(Error::input(path, "", "another run is writing this episode")),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}
+
+#[cfg(test)]
+#[path = "directory_tests.rs"]
+mod tests;

@@ -1,0 +1,320 @@
+//! The episode as a state machine.
+
+use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
+use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
+use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
+use crate::grid::Grid;
+use crate::plan::{self, Action, Decision, History, Reason, Situation};
+use crate::scene::{Body, Catalog, ObjectId, Scene};
+use crate::score::{Scores, object_verdicts};
+use crate::tool::{Push, Tool};
+use crate::world::{PushOutcome, TruthMap, World};
+use crate::{Error, Result};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+/// A running episode. A clone is a branch: both go on independently from the same state.
+#[derive(Clone)]
+pub struct Episode {
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    views: Arc<ViewArray>,
+    tool: Arc<Tool>,
+    world: World,
+    bodies: Arc<Vec<Body>>,
+    belief: Arc<Belief>,
+    truth: Arc<TruthMap>,
+    history: History,
+    record: EpisodeRecord,
+    deciding: Stopwatch,
+}
+
+impl Episode {
+    /// Sets the scene up (settled), with the uniform belief.
+    ///
+    /// # Errors
+    /// For a belief update that is not the one the configuration names, an unknown view array, a budget of zero, and a
+    /// scene that gives no bodies.
+    pub fn new(
+        scene: Scene,
+        catalog: Arc<Catalog>,
+        config: EpisodeConfig,
+        update: Arc<dyn BeliefUpdate>,
+    ) -> Result<Self> {
+        if config.belief != update.name() {
+            let message = format!("the episode is about belief `{}`, not `{}`", config.belief, update.name());
+            return Err(Error::Usage(message));
+        }
+        if config.budget == 0 {
+            return Err(Error::Usage("the budget must be at least one action".to_owned()));
+        }
+        let views = Arc::new(ViewArray::named(&config.views)?);
+        let mut world = World::new(scene.shelf, scene.bodies(&catalog)?);
+        world.settle();
+        let bodies = Arc::new(world.bodies());
+        let grid = scene.grid();
+        let belief = Arc::new(Belief::uniform(grid));
+        let truth = Arc::new(TruthMap::of(&grid, &bodies));
+        let record = EpisodeRecord {
+            format: FORMAT,
+            version: crate::VERSION.to_owned(),
+            scene,
+            config,
+            prior: Scores::of(&belief, &truth),
+            steps: Vec::new(),
+        };
+        Ok(Self {
+            catalog,
+            update,
+            views,
+            tool: Arc::new(Tool::standard()),
+            world,
+            bodies,
+            belief,
+            truth,
+            history: History::default(),
+            record,
+            deciding: Stopwatch::default(),
+        })
+    }
+
+    /// What the policy would do now, and what it weighed. Changes nothing; the same state decides the same.
+    pub fn decide(&self) -> Decision {
+        let started = Instant::now();
+        let really_look = |view: ViewId| match self.views.view(view) {
+            Some(view) => self.update.observe(&self.belief, &self.observe(view).1),
+            None => (*self.belief).clone(),
+        };
+        let situation = Situation {
+            belief: &self.belief,
+            update: &*self.update,
+            views: &self.views,
+            tool: &self.tool,
+            history: &self.history,
+            budget: self.record.config.budget,
+            seed: self.record.config.seed,
+            really_look: &really_look,
+        };
+        let decision = plan::decide(self.record.config.policy, &self.record.config.planner, &situation);
+        self.deciding.set(started.elapsed().as_secs_f64());
+        decision
+    }
+
+    /// Does `decision.action`, updates belief, truth and scores, and returns everything that it brought. The decision
+    /// may be another than the policy's (of [`Reason::Manual`]). Its `decide` seconds are those of the last
+    /// [`Episode::decide`] before.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] past the budget, for a view that the array does not have, for a push that is no finite motion,
+    /// and for a push after an object was dropped. The episode is then as it was.
+    pub fn act(&mut self, decision: Decision) -> Result<StepOutcome> {
+        if self.is_finished() {
+            return Err(Error::Usage(format!("the budget of {} actions is used up", self.record.config.budget)));
+        }
+        let seconds = StepSeconds { decide: self.deciding.take(), ..StepSeconds::default() };
+        let action = decision.action;
+        match action {
+            Action::Look { view } => self.look(decision, view, seconds),
+            Action::Push(push) => self.push(decision, push, seconds),
+        }
+    }
+
+    fn look(&mut self, decision: Decision, view: ViewId, mut seconds: StepSeconds) -> Result<StepOutcome> {
+        let Some(view) = self.views.view(view).cloned() else {
+            let views = self.views.views.len();
+            return Err(Error::Usage(format!("view {} of {views} in {}", view.0, self.views.name)));
+        };
+        let started = Instant::now();
+        let (image, observation) = self.observe(&view);
+        seconds.act = started.elapsed().as_secs_f64();
+
+        let started = Instant::now();
+        self.belief = Arc::new(self.update.observe(&self.belief, &observation));
+        let record = self.file(decision, &[], 0.0, started, seconds);
+        Ok(StepOutcome {
+            record,
+            image: Some(image),
+            observation: Some(observation),
+            swept: None,
+            prediction: None,
+            push_outcome: None,
+        })
+    }
+
+    fn push(&mut self, decision: Decision, push: Push, mut seconds: StepSeconds) -> Result<StepOutcome> {
+        if self.history.dropped {
+            return Err(Error::Usage("an object was dropped: this episode pushes no more".to_owned()));
+        }
+        let numbers = [push.start[0], push.start[1], push.start[2], push.direction_deg, push.length_m];
+        if !numbers.iter().all(|number| number.is_finite()) || push.length_m < 0.0 {
+            return Err(Error::Usage(format!("a push must be a finite motion, not {numbers:?}")));
+        }
+        let started = Instant::now();
+        let outcome: PushOutcome = self.world.execute(&self.tool, &push);
+        seconds.act = started.elapsed().as_secs_f64();
+
+        let started = Instant::now();
+        let swept = SweptPush { push, swept: self.tool.swept_volume(&push, &self.grid()) };
+        let prediction = self.predict(&swept, decision.reason);
+        if let Some(prediction) = &prediction {
+            Arc::make_mut(&mut self.belief).apply(prediction);
+        }
+        self.bodies = Arc::new(self.world.bodies());
+        self.truth = Arc::new(TruthMap::of(&self.grid(), &self.bodies));
+        let displacement_m = outcome.displacement_m.iter().map(|m| f64::from(*m)).sum();
+        let record = self.file(decision, &outcome.dropped, displacement_m, started, seconds);
+        Ok(StepOutcome {
+            record,
+            image: None,
+            observation: None,
+            swept: Some(swept),
+            prediction,
+            push_outcome: Some(outcome),
+        })
+    }
+
+    /// The prediction that becomes the belief after a push: for a policy that predicts its pushes, and for a person's.
+    fn predict(&self, swept: &SweptPush, reason: Reason) -> Option<PushPrediction> {
+        (self.record.config.policy.predicts_pushes() || reason == Reason::Manual)
+            .then(|| self.update.predict_pushes(&self.belief, std::slice::from_ref(swept)).pop())
+            .flatten()
+    }
+
+    /// What a view sees now, noise included: an oracle that asks sees what it will get.
+    fn observe(&self, view: &View) -> (Image, MapObservation) {
+        let (shelf, intrinsics) = (self.world.shelf(), &self.views.intrinsics);
+        let noise = self.record.config.noise.unwrap_or(NoiseModel::OFF);
+        let step = self.record.steps.len() as u64 + 1;
+        let image = noise.take(shelf, &self.bodies, view, intrinsics, self.record.config.seed, step);
+        let observation = camera::project(&image, view, intrinsics, shelf);
+        (image, observation)
+    }
+
+    /// Scores the new state and files the step.
+    fn file(
+        &mut self,
+        decision: Decision,
+        dropped: &[ObjectId],
+        displacement_m: f64,
+        updating: Instant,
+        mut seconds: StepSeconds,
+    ) -> StepRecord {
+        self.history.record(&decision, !dropped.is_empty());
+        let name = |id: &ObjectId| {
+            let object = self.record.scene.objects.get(usize::from(id.0));
+            format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
+        };
+        let scores = Scores::of(&self.belief, &self.truth);
+        let objects = object_verdicts(&self.belief, &self.truth, &self.catalog);
+        seconds.update = updating.elapsed().as_secs_f64();
+        let step = StepRecord {
+            index: self.record.steps.len() + 1,
+            action: decision.action,
+            decision,
+            scores,
+            objects,
+            dropped: dropped.iter().map(name).collect(),
+            displacement_m,
+            seconds,
+        };
+        self.record.steps.push(step.clone());
+        step
+    }
+
+    /// Adds to the `record` seconds of the last step: for whoever records it.
+    pub fn add_record_seconds(&mut self, seconds: f64) {
+        if let Some(step) = self.record.steps.last_mut() {
+            step.seconds.record += seconds;
+        }
+    }
+
+    /// Takes the seconds and the version of a log whose actions this episode has repeated.
+    pub(super) fn adopt_log(&mut self, logged: EpisodeRecord) {
+        self.record = logged;
+    }
+
+    /// Whether the budget is used up.
+    pub fn is_finished(&self) -> bool {
+        self.record.steps.len() >= self.record.config.budget
+    }
+
+    /// The record so far, as `episode.json` keeps it.
+    pub fn record(&self) -> &EpisodeRecord {
+        &self.record
+    }
+
+    /// The belief now.
+    pub fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    /// The truth now.
+    pub fn truth(&self) -> &TruthMap {
+        &self.truth
+    }
+
+    /// The bodies where they are now, dropped ones left out.
+    pub fn bodies(&self) -> Vec<Body> {
+        self.bodies.to_vec()
+    }
+
+    /// The world now.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// The grid of belief and truth.
+    pub fn grid(&self) -> Grid {
+        self.belief.grid
+    }
+
+    /// The candidate views.
+    pub fn views(&self) -> &ViewArray {
+        &self.views
+    }
+
+    /// What pushes.
+    pub fn tool(&self) -> &Tool {
+        &self.tool
+    }
+
+    /// The catalogue.
+    pub fn catalog(&self) -> &Catalog {
+        &self.catalog
+    }
+
+    /// How the belief changes.
+    pub fn update(&self) -> &dyn BeliefUpdate {
+        &*self.update
+    }
+
+    /// What the planner remembers.
+    pub fn history(&self) -> &History {
+        &self.history
+    }
+}
+
+/// Seconds that deciding took, kept from `decide`, which changes nothing else, to `act`.
+#[derive(Debug, Default)]
+struct Stopwatch(AtomicU64);
+
+impl Stopwatch {
+    fn set(&self, seconds: f64) {
+        self.0.store(seconds.to_bits(), Ordering::Relaxed);
+    }
+
+    fn take(&self) -> f64 {
+        f64::from_bits(self.0.swap(0, Ordering::Relaxed))
+    }
+}
+
+impl Clone for Stopwatch {
+    fn clone(&self) -> Self {
+        Self(AtomicU64::new(self.0.load(Ordering::Relaxed)))
+    }
+}
+
+#[cfg(test)]
+#[path = "machine_tests.rs"]
+mod tests;

@@ -1,0 +1,225 @@
+//! `beliefs/NNN.npz` and `truth/NNN.npz`: NumPy archives of a belief and of a truth.
+//!
+//! `numpy.load` reads them: a belief has `occupancy` `[W, D, H, 2]` (a_occ, a_free) and `semantics` `[W, D, 15]`, little
+//! endian float16 or float32; a truth has `occupancy` `[W, D, H]` and `labels` `[W, D]`, uint8. Archives are deflated at
+//! the fastest level and carry no time of day: the same arrays make the same bytes.
+
+use crate::belief::Belief;
+use crate::grid::Grid;
+use crate::scene::CLASS_COUNT;
+use crate::world::TruthMap;
+use crate::{Error, Result};
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use npyz::WriterBuilder;
+use npyz::zip::write::FileOptions;
+use npyz::zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
+use std::io::{Cursor, Read, Write};
+use std::path::Path;
+
+/// How a belief's evidence is kept in a file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// float16: 11 bits, relative error below 0.05 %.
+    #[default]
+    Half,
+    /// float32: exact.
+    Single,
+}
+
+impl Precision {
+    /// `values` as they are after writing and reading. Evidence beyond the largest float16 becomes that.
+    pub fn round_trip(self, values: &[f32]) -> Vec<f32> {
+        match self {
+            Self::Half => to_half(values).to_f32_vec(),
+            Self::Single => values.to_vec(),
+        }
+    }
+}
+
+fn to_half(values: &[f32]) -> Vec<f16> {
+    let mut halves = vec![f16::ZERO; values.len()];
+    halves.convert_from_f32_slice(values);
+    halves.iter_mut().filter(|half| half.is_infinite()).for_each(|half| *half = f16::MAX);
+    halves
+}
+
+/// A truth as files keep it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StoredTruth {
+    /// Numbers of voxels along x, y, z.
+    pub dims: [usize; 3],
+    /// 1 where a voxel's centre is inside an object.
+    pub occupancy: Vec<u8>,
+    /// Class of the tallest occupied voxel above a floor cell, else background.
+    pub labels: Vec<u8>,
+}
+
+impl From<&TruthMap> for StoredTruth {
+    fn from(truth: &TruthMap) -> Self {
+        Self { dims: truth.dims, occupancy: truth.occupancy.clone(), labels: truth.labels.clone() }
+    }
+}
+
+/// The archive of a belief.
+pub fn belief_archive(belief: &Belief, precision: Precision) -> Vec<u8> {
+    let [w, d, h] = belief.grid.dims;
+    let occupancy: &[f32] = belief.occupancy.as_flattened();
+    let semantics: &[f32] = belief.semantics.as_flattened();
+    let mut archive = Archive::new();
+    match precision {
+        Precision::Half => {
+            archive.add("occupancy", &[w, d, h, 2], &to_half(occupancy));
+            archive.add("semantics", &[w, d, CLASS_COUNT], &to_half(semantics));
+        }
+        Precision::Single => {
+            archive.add("occupancy", &[w, d, h, 2], occupancy);
+            archive.add("semantics", &[w, d, CLASS_COUNT], semantics);
+        }
+    }
+    archive.finish()
+}
+
+/// The archive of a truth.
+pub fn truth_archive(truth: &TruthMap) -> Vec<u8> {
+    let [w, d, h] = truth.dims;
+    let mut archive = Archive::new();
+    archive.add("occupancy", &[w, d, h], &truth.occupancy);
+    archive.add("labels", &[w, d], &truth.labels);
+    archive.finish()
+}
+
+/// Reads the archive of a belief over `grid`, and how it was kept. `path` is the file that errors name.
+pub fn read_belief(bytes: &[u8], path: &Path, grid: Grid) -> Result<(Belief, Precision)> {
+    let [w, d, h] = grid.dims;
+    let mut archive = OpenArchive::new(bytes, path)?;
+    let (occupancy, precision) = archive.evidence("occupancy", &[w, d, h, 2])?;
+    let (semantics, _) = archive.evidence("semantics", &[w, d, CLASS_COUNT])?;
+    let belief =
+        Belief { grid, occupancy: occupancy.as_chunks().0.to_vec(), semantics: semantics.as_chunks().0.to_vec() };
+    Ok((belief, precision))
+}
+
+/// Reads the archive of a truth over `grid`. `path` is the file that errors name.
+pub fn read_truth(bytes: &[u8], path: &Path, grid: Grid) -> Result<StoredTruth> {
+    let [w, d, h] = grid.dims;
+    let mut archive = OpenArchive::new(bytes, path)?;
+    let occupancy = archive.bytes("occupancy", &[w, d, h])?;
+    let labels = archive.bytes("labels", &[w, d])?;
+    if let Some(label) = labels.iter().find(|label| usize::from(**label) >= CLASS_COUNT) {
+        return Err(Error::input(path, "array labels", format!("class {label} of {CLASS_COUNT}")));
+    }
+    Ok(StoredTruth { dims: grid.dims, occupancy, labels })
+}
+
+/// Checks that the file is a whole archive with the named arrays, without reading them.
+pub fn check_archive(path: &Path, arrays: &[&str]) -> Result<()> {
+    let file = std::fs::File::open(path).map_err(|error| Error::io(path, error))?;
+    let mut zip = ZipArchive::new(std::io::BufReader::new(file))
+        .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))?;
+    for name in arrays {
+        zip.by_name(&npyz::npz::file_name_from_array_name(name))
+            .map_err(|error| Error::input(path, format!("array {name}"), error.to_string()))?;
+    }
+    Ok(())
+}
+
+/// An archive being written into memory.
+struct Archive {
+    zip: ZipWriter<Cursor<Vec<u8>>>,
+}
+
+impl Archive {
+    fn new() -> Self {
+        Self { zip: ZipWriter::new(Cursor::new(Vec::new())) }
+    }
+
+    fn add<T: npyz::AutoSerialize + Copy>(&mut self, name: &str, shape: &[usize], values: &[T]) {
+        let options = FileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .compression_level(Some(1))
+            .last_modified_time(DateTime::default());
+        let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
+        let mut npy = Vec::with_capacity(128 + size_of_val(values));
+        let mut writer = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(&shape)
+            .writer(&mut npy)
+            .begin_nd()
+            .expect("an array header goes into memory");
+        writer.extend(values.iter().copied()).and_then(|()| writer.finish()).expect("an array goes into memory");
+        self.zip
+            .start_file(npyz::npz::file_name_from_array_name(name), options)
+            .expect("an archive entry goes into memory");
+        self.zip.write_all(&npy).expect("an archive goes into memory");
+    }
+
+    fn finish(mut self) -> Vec<u8> {
+        self.zip.finish().expect("an archive goes into memory").into_inner()
+    }
+}
+
+/// An archive being read.
+struct OpenArchive<'a> {
+    zip: ZipArchive<Cursor<&'a [u8]>>,
+    path: &'a Path,
+}
+
+impl<'a> OpenArchive<'a> {
+    fn new(bytes: &'a [u8], path: &'a Path) -> Result<Self> {
+        let zip = ZipArchive::new(Cursor::new(bytes))
+            .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))?;
+        Ok(Self { zip, path })
+    }
+
+    /// The bytes of an array's `.npy`, checksum verified.
+    fn entry(&mut self, name: &str) -> Result<Vec<u8>> {
+        let fail = |message: String| Error::input(self.path, format!("array {name}"), message);
+        let mut entry =
+            self.zip.by_name(&npyz::npz::file_name_from_array_name(name)).map_err(|error| fail(error.to_string()))?;
+        let mut npy = Vec::new();
+        entry.read_to_end(&mut npy).map_err(|error| fail(error.to_string()))?;
+        Ok(npy)
+    }
+
+    /// Opens the array and checks its shape; hands the values to `read`.
+    fn array<T>(
+        &mut self,
+        name: &str,
+        shape: &[usize],
+        read: impl FnOnce(npyz::NpyFile<&[u8]>) -> std::io::Result<T>,
+    ) -> Result<T> {
+        let npy = self.entry(name)?;
+        let fail = |message: String| Error::input(self.path, format!("array {name}"), message);
+        let file = npyz::NpyFile::new(&npy[..]).map_err(|error| fail(error.to_string()))?;
+        let found: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
+        if found != shape {
+            return Err(fail(format!("has shape {found:?} where the scene's grid needs {shape:?}")));
+        }
+        if file.order() != npyz::Order::C {
+            return Err(fail("is in Fortran order".to_owned()));
+        }
+        read(file).map_err(|error| fail(error.to_string()))
+    }
+
+    fn bytes(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u8>> {
+        self.array(name, shape, |file| file.into_vec::<u8>())
+    }
+
+    /// Evidence as float32, and how it was kept.
+    fn evidence(&mut self, name: &str, shape: &[usize]) -> Result<(Vec<f32>, Precision)> {
+        let path = self.path;
+        let (values, precision) = self.array(name, shape, |file| {
+            if file.dtype().descr().contains("f2") {
+                Ok((file.into_vec::<f16>()?.to_f32_vec(), Precision::Half))
+            } else {
+                Ok((file.into_vec::<f32>()?, Precision::Single))
+            }
+        })?;
+        if let Some(at) = values.iter().position(|value| !value.is_finite() || *value < 0.0) {
+            let place = format!("array {name}");
+            return Err(Error::input(path, place, format!("entry {at} is {}, not evidence", values[at])));
+        }
+        Ok((values, precision))
+    }
+}

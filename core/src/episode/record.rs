@@ -1,0 +1,121 @@
+//! What is kept of an episode: its configuration, its steps, and `episode.json` as a whole.
+
+use crate::belief::{PushPrediction, SweptPush};
+use crate::camera::{Image, MapObservation, NoiseModel};
+use crate::plan::{Action, Decision, PlannerSettings, PolicyKind};
+use crate::scene::Scene;
+use crate::score::{ObjectVerdict, Scores};
+use crate::world::PushOutcome;
+use serde::{Deserialize, Serialize};
+
+/// The format number of `episode.json`.
+pub const FORMAT: u32 = 1;
+
+/// What an episode is run with, beside its scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeConfig {
+    /// The rule that chooses actions.
+    pub policy: PolicyKind,
+    /// Name of the belief update: `classical` or `cnabu`.
+    pub belief: String,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Number of actions.
+    pub budget: usize,
+    /// Name of the view array.
+    pub views: String,
+    /// The planner's numbers.
+    pub planner: PlannerSettings,
+    /// What the camera gets wrong; nothing unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseModel>,
+}
+
+/// Wall-clock seconds of one step, by what they went into.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepSeconds {
+    /// Deciding.
+    pub decide: f64,
+    /// Taking the image or simulating the push.
+    pub act: f64,
+    /// Updating belief, truth and scores.
+    pub update: f64,
+    /// Writing files and recording.
+    pub record: f64,
+}
+
+impl StepSeconds {
+    /// All parts together.
+    pub fn total(&self) -> f64 {
+        self.decide + self.act + self.update + self.record
+    }
+}
+
+/// One step as `episode.json` keeps it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// 1 for the first action; the belief after it is `beliefs/001.npz`.
+    pub index: usize,
+    /// What was done.
+    pub action: Action,
+    /// What was weighed.
+    pub decision: Decision,
+    /// Scores of the belief after the step.
+    pub scores: Scores,
+    /// Verdict per object of the scene, and hallucinated ones.
+    pub objects: Vec<ObjectVerdict>,
+    /// Names of objects that this step dropped, `class#id`.
+    pub dropped: Vec<String>,
+    /// Sum of object displacements of this step, metres.
+    pub displacement_m: f64,
+    /// Where the time went.
+    pub seconds: StepSeconds,
+}
+
+/// `episode.json`, and what `nudge run --json` prints.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeRecord {
+    /// Format number, [`FORMAT`].
+    pub format: u32,
+    /// Version of the program that wrote it.
+    pub version: String,
+    /// The scene, embedded with its meshes.
+    pub scene: Scene,
+    /// Policy, belief, seed, budget, views and planner settings.
+    #[serde(flatten)]
+    pub config: EpisodeConfig,
+    /// Scores of the prior.
+    pub prior: Scores,
+    /// The steps so far.
+    pub steps: Vec<StepRecord>,
+}
+
+impl EpisodeRecord {
+    /// The numbers of actions after which there is a truth: 0 and every push.
+    pub fn truth_indices(&self) -> impl Iterator<Item = usize> + '_ {
+        let pushes = self.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).map(|step| step.index);
+        std::iter::once(0).chain(pushes)
+    }
+
+    /// The truth that holds after `actions` actions: the index of the last push until then, or 0.
+    pub fn truth_index(&self, actions: usize) -> usize {
+        self.truth_indices().take_while(|index| *index <= actions).last().unwrap_or(0)
+    }
+}
+
+/// Everything that one action brought, for recorders and windows.
+#[derive(Clone, Debug)]
+pub struct StepOutcome {
+    /// The step as it is filed.
+    pub record: StepRecord,
+    /// The image, after a look.
+    pub image: Option<Image>,
+    /// The image projected into the grid, after a look.
+    pub observation: Option<MapObservation>,
+    /// The push with its swept volume, after a push.
+    pub swept: Option<SweptPush>,
+    /// The belief that was predicted for the push, after a push that was predicted.
+    pub prediction: Option<PushPrediction>,
+    /// What the push did.
+    pub push_outcome: Option<PushOutcome>,
+}

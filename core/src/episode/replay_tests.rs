@@ -1,0 +1,189 @@
+use super::super::npz;
+use super::super::resume;
+use super::super::synthetic;
+use super::super::{Overwrite, Precision};
+use super::*;
+use crate::belief::Classical;
+use crate::plan::{Action, PolicyKind};
+use std::fs;
+use std::path::Path;
+use tempfile::tempdir;
+
+const BUDGET: usize = 7;
+
+/// Runs an episode with a push in it (at step 5) for `steps` steps, writing it to `path`.
+fn run(path: &Path, steps: usize) -> Episode {
+    let mut episode = synthetic::episode(PolicyKind::RandomPush5, BUDGET);
+    let mut directory = EpisodeDir::create(path, Overwrite::Refuse).expect("created");
+    directory.write(&mut episode).expect("written");
+    go_on(&mut episode, &mut directory, steps);
+    episode
+}
+
+fn go_on(episode: &mut Episode, directory: &mut EpisodeDir, steps: usize) {
+    for _ in 0..steps {
+        episode.act(episode.decide()).expect("an action");
+        directory.write(episode).expect("written");
+    }
+}
+
+fn replayed(path: &Path) -> Result<ReplayReport> {
+    replay(&EpisodeDir::open(path)?, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |_, _| {})
+}
+
+/// `episode.json` without what may differ between two runs.
+fn timeless(path: &Path) -> String {
+    let mut record = EpisodeDir::open(path).expect("opens").record().expect("a record");
+    record.steps.iter_mut().for_each(|step| step.seconds = Default::default());
+    record.to_json()
+}
+
+fn copy(from: &Path, to: &Path) {
+    fs::create_dir_all(to).expect("made");
+    for entry in fs::read_dir(from).expect("listed") {
+        let entry = entry.expect("an entry").path();
+        let target = to.join(entry.file_name().expect("a name"));
+        if entry.is_dir() {
+            copy(&entry, &target);
+        } else {
+            fs::copy(&entry, &target).expect("copied");
+        }
+    }
+}
+
+#[test]
+fn an_episode_resumes_and_replays_to_the_bit() {
+    let root = tempdir().expect("a temporary directory");
+    let (whole, stopped) = (root.path().join("whole"), root.path().join("stopped"));
+    let first = run(&whole, BUDGET);
+    assert!(matches!(first.record().steps[4].action, Action::Push(_)), "{:?}", first.record().steps[4]);
+
+    for steps in [0, 3, 5] {
+        drop(run(&stopped, steps));
+        let mut calls = Vec::new();
+        let (mut directory, mut episode) =
+            resume(&stopped, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |episode, outcome| {
+                calls.push((episode.record().steps.len(), outcome.is_some()));
+                Ok(())
+            })
+            .expect("resumes");
+        assert_eq!(calls.first(), Some(&(0, false)));
+        assert_eq!(calls.last(), Some(&(steps, steps > 0)));
+        assert_eq!(calls.len(), steps + 1);
+        assert_eq!(episode.history().actions.len(), steps);
+        go_on(&mut episode, &mut directory, BUDGET - steps);
+        assert!(episode.is_finished() && episode.belief() == first.belief() && episode.truth() == first.truth());
+        drop(directory);
+        assert_eq!(timeless(&stopped), timeless(&whole));
+        for index in 0..=BUDGET {
+            let file = format!("beliefs/{index:03}.npz");
+            assert!(
+                fs::read(stopped.join(&file)).expect("read") == fs::read(whole.join(&file)).expect("read"),
+                "{file}"
+            );
+        }
+        let truths = |path: &Path| {
+            ["000", "005"].map(|index| fs::read(path.join("truth").join(format!("{index}.npz"))).expect("read"))
+        };
+        assert!(truths(&stopped) == truths(&whole));
+        assert_eq!(fs::read_dir(stopped.join("truth")).expect("listed").count(), 2);
+        fs::remove_dir_all(&stopped).expect("removed");
+    }
+
+    let report = replayed(&whole).expect("replays");
+    assert_eq!((report.agreement, report.steps, report.budget), (Agreement::BitEqual, BUDGET, BUDGET));
+    report.verdict().expect("the same");
+
+    // Whatever is changed in the log or in a file is found, and where.
+    let path = root.path().join("changed");
+    copy(&whole, &path);
+    let edit = |change: &dyn Fn(&mut EpisodeRecord)| {
+        let mut record = EpisodeDir::open(&path).expect("opens").record().expect("a record");
+        change(&mut record);
+        fs::write(path.join("episode.json"), record.to_json()).expect("written");
+    };
+    edit(&|record| {
+        record.prior.entropy_nats += 1.0;
+        record.steps[1].decision.gains[7] += 0.25;
+        record.steps[3].scores.semantic_miou += 1e-12;
+        record.steps[5].objects[0].class = "gum_tin".to_owned();
+    });
+    let directory = EpisodeDir::open(&path).expect("opens");
+    let mut belief = directory.read_belief(3).expect("a belief");
+    belief.semantics[17][2] += 0.5;
+    fs::write(directory.belief_path(3), npz::belief_archive(&belief, Precision::Half)).expect("written");
+    let mut truth = first.truth().clone();
+    truth.occupancy[1234] ^= 1;
+    fs::write(directory.truth_path(5), npz::truth_archive(&truth)).expect("written");
+    let report = replayed(&path).expect("replays");
+    assert_eq!(report.agreement, Agreement::Differs);
+    let places: Vec<(usize, &str)> = report.differences.iter().map(|d| (d.step, d.place.as_str())).collect();
+    let expected = [
+        (0, "prior.entropy_nats"),
+        (2, "decision.gains[7]"),
+        (3, "beliefs/003.npz: semantics[257]"),
+        (4, "scores.semantic_miou"),
+        (5, "truth/005.npz: occupancy[1234]"),
+        (6, "objects[0].class"),
+    ];
+    assert_eq!(places, expected);
+    let error = report.verdict().expect_err("differs");
+    assert_eq!(error.exit_code(), 1);
+    assert!(error.to_string().starts_with("the replay differs: step 0: prior.entropy_nats: "), "{error}");
+    fs::remove_dir_all(&path).expect("removed");
+
+    // A resume notices as well.
+    copy(&whole, &path);
+    edit(&|record| record.steps[2].displacement_m = 0.5);
+    let error =
+        resume(&path, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |_, _| Ok(())).err().expect("differs");
+    assert_eq!(error.exit_code(), 1);
+    assert!(
+        error.to_string().contains("cannot be resumed: step 3: displacement_m: 0.5 in the log, 0.0 now"),
+        "{error}"
+    );
+    // Seconds are nobody's business; a byte that flipped in a file is bad input.
+    edit(&|record| {
+        record.steps[2].displacement_m = 0.0;
+        record.steps[2].seconds.decide = 99.0;
+    });
+    drop(resume(&path, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |_, _| Ok(())).expect("resumes"));
+    let file = path.join("beliefs").join("004.npz");
+    let mut bytes = fs::read(&file).expect("read");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&file, bytes).expect("written");
+    let error = replayed(&path).expect_err("damaged");
+    assert_eq!(error.exit_code(), 2);
+    assert!(error.to_string().starts_with(&file.display().to_string()), "{error}");
+}
+
+#[test]
+fn a_tolerant_comparison_tells_equal_from_close_from_different() {
+    let compare = |tolerance: f64, logged: f32, now: f32| {
+        let mut comparison = Comparison::new(tolerance);
+        comparison.evidence("occupancy", &[1.0, logged], &[1.0, now]);
+        comparison.agreement()
+    };
+    assert_eq!(compare(TOLERANCE, 100.0, 100.0), Agreement::BitEqual);
+    assert!(matches!(compare(TOLERANCE, 100.0, 100.0625), Agreement::Within { largest } if largest < TOLERANCE));
+    assert_eq!(compare(TOLERANCE, 100.0, 100.2), Agreement::Differs);
+    assert_eq!(compare(TOLERANCE, 0.5, 0.5005), Agreement::Within { largest: f64::from(0.5005_f32) - 0.5 });
+    assert_eq!(compare(0.0, 100.0, 100.00001), Agreement::Differs);
+    assert_eq!(compare(0.0, 0.0, -0.0), Agreement::Differs);
+
+    let documents = |logged: Value, now: Value| {
+        let mut comparison = Comparison::new(TOLERANCE);
+        comparison.documents("decision", &logged, &now);
+        comparison.differences.first().map(Difference::to_string)
+    };
+    use serde_json::json;
+    assert_eq!(documents(json!({"gains": [1.0, 2.0]}), json!({"gains": [1.0, 2.001]})), None);
+    // Whole numbers are names of things: there is no close.
+    let view = documents(json!({"action": {"view": 1700}}), json!({"action": {"view": 1701}}));
+    assert_eq!(view.as_deref(), Some("step 0: decision.action.view: 1700 in the log, 1701 now"));
+    let more = documents(json!({"pair": [1]}), json!({"pair": [1, 2]}));
+    assert_eq!(more.as_deref(), Some("step 0: decision.pair: 1 entries in the log, 2 now"));
+    let missing = documents(json!({"a": 1, "b": null}), json!({"b": null, "c": "x"}));
+    assert_eq!(missing.as_deref(), Some("step 0: decision.a: 1 in the log, null now"));
+}

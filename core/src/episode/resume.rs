@@ -1,0 +1,51 @@
+//! Going on with an episode whose run was stopped.
+
+use super::directory::EpisodeDir;
+use super::machine::Episode;
+use super::record::StepOutcome;
+use super::replay::Comparison;
+use crate::belief::BeliefUpdate;
+use crate::scene::Catalog;
+use crate::{Error, Result};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Is shown an episode on its way, with what the last action brought.
+pub type Observer<'a> = &'a mut dyn FnMut(&Episode, Option<&StepOutcome>) -> Result<()>;
+
+/// Opens the episode in `path` to go on with it: repeats the actions of its log without deciding anew, and verifies
+/// after every one that belief, truth and scores are those in the directory, the beliefs bit for bit. `observer` is shown
+/// the prior (without an outcome) and every action once it is verified, so that a recording can be made anew.
+///
+/// # Errors
+/// [`Error::Input`] or [`Error::Io`] for a directory that holds no episode or a damaged one, [`Error::Check`] when the
+/// repeated actions do not lead where the log says (written by another version, or on another machine).
+pub fn resume(
+    path: impl AsRef<Path>,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    observer: Observer<'_>,
+) -> Result<(EpisodeDir, Episode)> {
+    let directory = EpisodeDir::open_to_write(path.as_ref())?;
+    let logged = directory.record()?;
+    let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
+    let mut comparison = Comparison::new(0.0);
+    for done in 0..=logged.steps.len() {
+        let mut outcome = None;
+        if let Some(step) = done.checked_sub(1).map(|at| &logged.steps[at]) {
+            let repeated = episode.act(step.decision.clone())?;
+            comparison.step(step, &repeated.record);
+            outcome = Some(repeated);
+        } else {
+            comparison.prior(&logged, episode.record());
+        }
+        comparison.arrays(&directory, &logged, done, &episode)?;
+        if let Some(difference) = comparison.first_difference() {
+            let place = path.as_ref().display();
+            return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
+        }
+        observer(&episode, outcome.as_ref())?;
+    }
+    episode.adopt_log(logged);
+    Ok((directory, episode))
+}

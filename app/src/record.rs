@@ -1,0 +1,358 @@
+//! An episode's events as Rerun entities.
+//!
+//! The recorder writes step by step on the timeline `step`: 0 is the prior, `n` is the state after the `n`-th action
+//! together with the decision that led to it. A file is flushed after every step, so that a run that was killed leaves
+//! a recording that opens. The layout is inside the file. Wall-clock timelines are off, so that two runs of the same
+//! episode give recordings with the same content.
+//!
+//! Entity names are in [`paths`] and nowhere else.
+
+mod blueprint;
+mod decision;
+mod floor;
+mod layout;
+pub mod paths;
+mod shapes;
+mod voxels;
+
+use crate::picture;
+use nudge_core::belief::{Belief, PushPrediction};
+use nudge_core::camera::{Image, View, ViewArray};
+use nudge_core::episode::{Episode, StepOutcome, StepRecord};
+use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
+use nudge_core::grid::Grid;
+use nudge_core::plan::Action;
+use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
+use nudge_core::score::Scores;
+use nudge_core::world::TruthMap;
+use nudge_core::{Error, Result};
+use rerun::{AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// The application id of every recording; the viewer keeps one layout per application.
+pub const APPLICATION: &str = "nudge";
+
+/// What does not change during an episode.
+#[derive(Clone, Copy)]
+pub struct Setting<'a> {
+    /// The shelf.
+    pub shelf: &'a Shelf,
+    /// Names and colours of the classes.
+    pub catalog: &'a Catalog,
+    /// The candidate views.
+    pub views: &'a ViewArray,
+    /// Number of actions in all.
+    pub budget: usize,
+    /// Weight of the disturbance term.
+    pub gamma: f32,
+}
+
+/// The state after a step.
+#[derive(Clone, Copy)]
+pub struct State<'a> {
+    /// Number of actions so far.
+    pub step: usize,
+    /// The bodies where they are.
+    pub bodies: &'a [Body],
+    /// What is believed.
+    pub belief: &'a Belief,
+    /// What is.
+    pub truth: &'a TruthMap,
+    /// How they compare.
+    pub scores: &'a Scores,
+}
+
+/// Writes an episode into a recording.
+pub struct Recorder {
+    stream: RecordingStream,
+    /// Put before every entity path; empty unless two episodes share a recording.
+    root: EntityPath,
+    /// The file, for messages.
+    file: PathBuf,
+    /// The belief before the next step, as rays see it.
+    field: Option<GainField>,
+    /// Objects with a mesh in the recording that have not been cleared.
+    shown: BTreeSet<ObjectId>,
+    /// The truth that was last recorded.
+    truth: Option<TruthMap>,
+}
+
+impl Recorder {
+    /// Starts `path` (an `.rrd` file, overwritten) with the layout and everything that does not change.
+    pub fn create(path: &Path, episode: &Episode) -> Result<Self> {
+        let record = episode.record();
+        let stream = file_stream(path, &format!("{} seed {}", record.scene.name, record.config.seed))?;
+        let recorder = Self::bare(stream, "", path);
+        let plan = picture::FloorPlan::of(&record.scene.grid());
+        recorder.check(layout::standard("", plan).send(&recorder.stream, APPLICATION))?;
+        recorder.set_up(&setting(episode))?;
+        Ok(recorder)
+    }
+
+    /// Writes into a stream of the caller's, under `root` (`""`, or for example `"b"` for the second episode of a
+    /// comparison), without a layout. Wall-clock timelines of the stream are switched off.
+    pub fn to_stream(stream: RecordingStream, root: &str, episode: &Episode) -> Result<Self> {
+        let recorder = Self::bare(stream, root, Path::new("recording"));
+        recorder.set_up(&setting(episode))?;
+        Ok(recorder)
+    }
+
+    fn bare(stream: RecordingStream, root: &str, file: &Path) -> Self {
+        stream.set_log_time_enabled(false);
+        stream.set_log_tick_enabled(false);
+        Self {
+            stream,
+            root: EntityPath::parse_forgiving(root),
+            file: file.to_owned(),
+            field: None,
+            shown: BTreeSet::new(),
+            truth: None,
+        }
+    }
+
+    /// Records the state before the first step.
+    pub fn prior(&mut self, episode: &Episode) -> Result<()> {
+        let bodies = episode.bodies();
+        self.state(&setting(episode), &state(episode, &bodies))?;
+        self.field = Some(GainField::new(episode.belief()));
+        self.note(format!("prior: {}", decision::scores_line(&episode.record().prior)), rerun::TextLogLevel::INFO)?;
+        self.flush()
+    }
+
+    /// Records a step: what was weighed, what was done, and the state after it.
+    pub fn step(&mut self, episode: &Episode, outcome: &StepOutcome) -> Result<()> {
+        let setting = setting(episode);
+        let nats = self.gain_of_voxels(&setting, outcome);
+        let bodies = episode.bodies();
+        self.state(&setting, &state(episode, &bodies))?;
+        self.outcome(&setting, episode.belief(), outcome, &nats)?;
+        self.field = Some(GainField::new(episode.belief()));
+        self.flush()
+    }
+
+    /// Ends the recording; a file gets its index.
+    pub fn finish(self) -> Result<()> {
+        self.flush()?;
+        self.stream.disconnect();
+        Ok(())
+    }
+
+    /// Where the chosen action's gain comes from: the look's under the belief, the push's under its prediction.
+    fn gain_of_voxels(&self, setting: &Setting<'_>, outcome: &StepOutcome) -> Vec<(usize, f32)> {
+        let Some(field) = &self.field else { return Vec::new() };
+        let decision = &outcome.record.decision;
+        match (decision.action, &outcome.prediction) {
+            (Action::Look { view }, _) => gain_per_voxel(field, setting.views, view, RayDensity::COARSE),
+            (Action::Push(_), Some(prediction)) => {
+                let best = decision.best_push.and_then(|at| decision.candidates.get(at)?.view);
+                best.map_or_else(Vec::new, |view| {
+                    gain_per_voxel(&field.with_prediction(prediction), setting.views, view, RayDensity::COARSE)
+                })
+            }
+            (Action::Push(_), None) => Vec::new(),
+        }
+    }
+
+    fn set_up(&self, setting: &Setting<'_>) -> Result<()> {
+        let view_up = rerun::ViewCoordinates::RIGHT_HAND_Z_UP();
+        self.check(self.stream.log_static(self.root.clone(), &view_up))?;
+        self.check(self.stream.log_static(self.root.clone(), &floor::class_names(setting.catalog)))?;
+        self.fix(paths::SHELF, &shapes::shelf_panels(setting.shelf))?;
+        self.fix(paths::SHELF_EDGES, &shapes::shelf_edges(setting.shelf))?;
+        self.fix(paths::CAMERA_VIEWS, &shapes::view_frusta(setting.views))?;
+        let grid = setting.shelf.grid();
+        for (path, legend) in floor::legends(&grid) {
+            self.fix(&format!("{path}/{}", paths::SCALE), &legend.bar)?;
+            self.fix(&format!("{path}/{}", paths::SCALE_LABELS), &legend.labels)?;
+        }
+        self.fix(paths::CLASS_LEGEND, &floor::class_legend(setting.catalog))?;
+        for series in decision::SERIES {
+            let line = rerun::SeriesLines::new()
+                .with_names([series.title])
+                .with_colors([rerun::Color::from(series.rgb)])
+                .with_widths([2.0_f32]);
+            self.fix(&paths::score(series.key), &line)?;
+        }
+        let pushes = rerun::SeriesPoints::new()
+            .with_names(["push"])
+            .with_colors([rerun::Color::from([240, 240, 240])])
+            .with_markers([rerun::components::MarkerShape::Up])
+            .with_marker_sizes([5.0_f32]);
+        self.fix(&paths::score(paths::SCORE_PUSH), &pushes)
+    }
+
+    /// Records bodies, belief, truth, error and scores.
+    fn state(&mut self, setting: &Setting<'_>, state: &State<'_>) -> Result<()> {
+        self.stream.set_time_sequence(paths::TIMELINE, state.step as i64);
+        if self.truth.is_none() {
+            self.log(paths::CAMERA_VIEWS, &shapes::frusta_without_gain(setting.views))?;
+        }
+        self.bodies(setting, state.bodies)?;
+        let (grid, belief) = (&state.belief.grid, state.belief);
+        self.log(paths::BELIEF_OCCUPANCY, &voxels::believed_occupied(belief))?;
+        self.log(paths::BELIEF_CLASSES, &voxels::believed_classes(belief, setting.catalog))?;
+        self.log(paths::BELIEF_OPEN, &voxels::undecided(belief))?;
+        self.log(paths::BELIEF_SEMANTICS, &floor::classes(belief))?;
+        self.log(paths::BELIEF_CERTAINTY, &floor::certainty(belief))?;
+        self.log(paths::BELIEF_ENTROPY, &floor::picture(&picture::paint_entropy(belief)))?;
+        if self.truth.as_ref() != Some(state.truth) {
+            self.log(paths::TRUTH_OCCUPANCY, &voxels::true_classes(grid, state.truth, setting.catalog))?;
+            self.log(paths::TRUTH_LABELS, &floor::labels(grid, &state.truth.labels))?;
+            self.log(paths::TRUTH_OUTLINES, &floor::outlines(state.truth))?;
+            self.truth = Some(state.truth.clone());
+        }
+        self.log(paths::ERROR_OCCUPANCY, &voxels::errors(belief, state.truth))?;
+        self.log(paths::ERROR_SEMANTICS, &floor::picture(&picture::paint_errors(belief, state.truth)))?;
+        for series in decision::SERIES {
+            self.log(&paths::score(series.key), &rerun::Scalars::single((series.value)(state.scores)))?;
+        }
+        Ok(())
+    }
+
+    fn bodies(&mut self, setting: &Setting<'_>, bodies: &[Body]) -> Result<()> {
+        let present: BTreeSet<ObjectId> = bodies.iter().map(|body| body.id).collect();
+        for gone in self.shown.difference(&present) {
+            self.log(&paths::object(*gone), &rerun::Clear::recursive())?;
+        }
+        for body in bodies {
+            let path = paths::object(body.id);
+            if !self.shown.contains(&body.id) {
+                self.log(&path, &shapes::glass(body, setting.catalog))?;
+            }
+            self.log(&path, &shapes::transform(&body.world_from_body))?;
+        }
+        self.shown = present;
+        Ok(())
+    }
+
+    /// Records the decision of a step and what the action brought; what no longer applies is cleared.
+    fn outcome(
+        &self,
+        setting: &Setting<'_>,
+        belief: &Belief,
+        outcome: &StepOutcome,
+        nats: &[(usize, f32)],
+    ) -> Result<()> {
+        let (record, grid) = (&outcome.record, &belief.grid);
+        let decision = &record.decision;
+        let range = shapes::gain_range(decision);
+        self.log(paths::CAMERA_VIEWS, &shapes::frusta_colors(&decision.gains, range))?;
+        self.log(paths::GAIN_VIEWS, &floor::gain_map(setting.views, &decision.gains, range))?;
+        self.log(paths::GAIN_CHOSEN, &floor::chosen_views(setting.views, decision))?;
+        self.log_or_clear(paths::GAIN_VOXELS, (!nats.is_empty()).then(|| voxels::gains(grid, nats)))?;
+        let any = !decision.candidates.is_empty();
+        self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision, setting.gamma)))?;
+        match (record.action, &outcome.image) {
+            (Action::Look { view }, Some(image)) => self.look(setting, view, image)?,
+            _ => {
+                for path in [paths::CAMERA_CURRENT, paths::OBSERVATION_DEPTH, paths::OBSERVATION_LABELS] {
+                    self.log(path, &rerun::Clear::flat())?;
+                }
+            }
+        }
+        let push = match record.action {
+            Action::Push(push) => Some(shapes::chosen_push(&push)),
+            Action::Look { .. } => None,
+        };
+        self.log_or_clear(paths::PUSH_CHOSEN, push)?;
+        self.log_or_clear(paths::PUSH_SWEPT, outcome.swept.as_ref().map(|swept| voxels::swept(grid, &swept.swept)))?;
+        self.predicted(grid, outcome.prediction.as_ref())?;
+        let pushed = matches!(record.action, Action::Push(_));
+        let mark = rerun::Scalars::single(0.0);
+        self.log_or_clear(&paths::score(paths::SCORE_PUSH), pushed.then_some(mark))?;
+        self.log(paths::DECISION, &rerun::TextDocument::from_markdown(decision::markdown(setting, record)))?;
+        self.note(decision::line(record), rerun::TextLogLevel::INFO)?;
+        self.warn(record)
+    }
+
+    fn look(&self, setting: &Setting<'_>, view: nudge_core::camera::ViewId, image: &Image) -> Result<()> {
+        let Some(View { world_from_camera, .. }) = setting.views.views.get(usize::from(view.0)) else { return Ok(()) };
+        self.log(paths::CAMERA_CURRENT, &shapes::transform(world_from_camera))?;
+        self.log(paths::CAMERA_CURRENT, &shapes::pinhole(&setting.views.intrinsics))?;
+        self.log(paths::OBSERVATION_DEPTH, &shapes::depth_image(image, &setting.views.intrinsics))?;
+        self.log(paths::OBSERVATION_LABELS, &shapes::label_image(image))
+    }
+
+    fn predicted(&self, grid: &Grid, prediction: Option<&PushPrediction>) -> Result<()> {
+        let at = [paths::PREDICTED_OCCUPANCY, paths::PREDICTED_SEMANTICS, paths::PREDICTED_CHANGE];
+        let Some(prediction) = prediction else {
+            return at.iter().try_for_each(|path| self.log(path, &rerun::Clear::flat()));
+        };
+        self.log(at[0], &voxels::predicted(grid, prediction))?;
+        self.log(at[1], &floor::predicted_classes(grid, prediction))?;
+        self.log(at[2], &floor::predicted_change(grid, prediction))
+    }
+
+    fn warn(&self, record: &StepRecord) -> Result<()> {
+        record.dropped.iter().try_for_each(|name| {
+            self.note(format!("step {}: {name} fell off the board", record.index), rerun::TextLogLevel::WARN)
+        })
+    }
+
+    fn note(&self, text: String, level: &str) -> Result<()> {
+        self.log(paths::LOG, &rerun::TextLog::new(text).with_level(level))
+    }
+
+    fn at(&self, path: &str) -> EntityPath {
+        self.root.join(&EntityPath::parse_forgiving(path))
+    }
+
+    fn log(&self, path: &str, content: &impl AsComponents) -> Result<()> {
+        self.check(self.stream.log(self.at(path), content))
+    }
+
+    fn log_or_clear(&self, path: &str, content: Option<impl AsComponents>) -> Result<()> {
+        match content {
+            Some(content) => self.log(path, &content),
+            None => self.log(path, &rerun::Clear::flat()),
+        }
+    }
+
+    fn fix(&self, path: &str, content: &impl AsComponents) -> Result<()> {
+        self.check(self.stream.log_static(self.at(path), content))
+    }
+
+    fn flush(&self) -> Result<()> {
+        self.check(self.stream.flush_blocking())
+    }
+
+    fn check<T>(&self, result: std::result::Result<T, impl std::fmt::Display>) -> Result<T> {
+        result.map_err(|error| Error::io(&self.file, std::io::Error::other(error.to_string())))
+    }
+}
+
+/// A stream into a file of its own.
+fn file_stream(path: &Path, name: &str) -> Result<RecordingStream> {
+    let failed = |error: &dyn std::fmt::Display| Error::io(path, std::io::Error::other(error.to_string()));
+    // Created here first, so that the system's own words reach the user.
+    std::fs::File::create(path).map_err(|error| Error::io(path, error))?;
+    let stream = RecordingStreamBuilder::new(APPLICATION).send_properties(false).save(path).map_err(|e| failed(&e))?;
+    stream.send_recording_name(name).map_err(|e| failed(&e))?;
+    Ok(stream)
+}
+
+fn setting(episode: &Episode) -> Setting<'_> {
+    let record = episode.record();
+    Setting {
+        shelf: &record.scene.shelf,
+        catalog: episode.catalog(),
+        views: episode.views(),
+        budget: record.config.budget,
+        gamma: record.config.planner.gamma,
+    }
+}
+
+fn state<'a>(episode: &'a Episode, bodies: &'a [Body]) -> State<'a> {
+    let record = episode.record();
+    State {
+        step: record.steps.len(),
+        bodies,
+        belief: episode.belief(),
+        truth: episode.truth(),
+        scores: record.steps.last().map_or(&record.prior, |step| &step.scores),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,210 @@
+//! A decision in words and tables, and the scores as series.
+
+use super::Setting;
+use nudge_core::episode::StepRecord;
+use nudge_core::plan::{Action, CandidateRecord, Decision, Reason};
+use nudge_core::push::Rejection;
+use nudge_core::score::Scores;
+use std::fmt::Write as _;
+
+/// One score over the steps.
+pub struct Series {
+    /// Its key in `episode.json`.
+    pub key: &'static str,
+    /// Its name with unit.
+    pub title: &'static str,
+    /// Its colour.
+    pub rgb: [u8; 3],
+    /// Its value.
+    pub value: fn(&Scores) -> f64,
+}
+
+/// The scores that are recorded.
+pub const SERIES: &[Series] = &[
+    Series { key: "occupancy_iou", title: "occupancy IoU", rgb: [86, 156, 214], value: |s| s.occupancy_iou },
+    Series { key: "occupied_iou", title: "occupied IoU", rgb: [150, 200, 240], value: |s| s.occupied_iou },
+    Series { key: "semantic_miou", title: "semantic mIoU", rgb: [98, 196, 140], value: |s| s.semantic_miou },
+    Series { key: "entropy_nats", title: "map entropy (nats)", rgb: [220, 110, 170], value: |s| s.entropy_nats },
+    Series { key: "mece_occupancy", title: "mECE of occupancy", rgb: [240, 180, 80], value: |s| s.mece_occupancy },
+    Series { key: "mece_semantics", title: "mECE of semantics", rgb: [230, 130, 60], value: |s| s.mece_semantics },
+];
+
+/// How many views and pushes the tables list.
+const LISTED: usize = 5;
+
+/// The scores in one line.
+pub fn scores_line(scores: &Scores) -> String {
+    format!(
+        "IoU {:.3}, mIoU {:.3}, entropy {} nats",
+        scores.occupancy_iou,
+        scores.semantic_miou,
+        thousands(scores.entropy_nats)
+    )
+}
+
+/// A step in one line.
+pub fn line(record: &StepRecord) -> String {
+    format!(
+        "step {}: {} ({}); {}",
+        record.index,
+        action(&record.action),
+        reason(record.decision.reason),
+        scores_line(&record.scores)
+    )
+}
+
+/// An action in words.
+fn action(action: &Action) -> String {
+    match action {
+        Action::Look { view } => format!("look from view {}", view.0),
+        Action::Push(push) => format!("push {:.0} mm towards {:.0}°", push.length_m * 1e3, push.direction_deg),
+    }
+}
+
+/// A reason in words.
+fn reason(reason: Reason) -> &'static str {
+    match reason {
+        Reason::LookTellsMore => "looking tells more",
+        Reason::PushTellsMore => "pushing tells more",
+        Reason::ViewOfPush => "the view that made the push worth it",
+        Reason::TooEarly => "no push in the first three steps",
+        Reason::LastStep => "no push in the last step",
+        Reason::JustPushed => "no push right after a push",
+        Reason::MapComplete => "the map is complete",
+        Reason::Dropped => "an object was dropped, so no more pushes",
+        Reason::NoCandidate => "no feasible push",
+        Reason::Schedule => "the policy's schedule",
+        Reason::Manual => "chosen by hand",
+    }
+}
+
+/// The decision of a step as a page.
+pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
+    let decision = &record.decision;
+    let mut page = format!(
+        "### Step {} of {}: {}\n\n*{}*\n\n",
+        record.index,
+        setting.budget,
+        action(&record.action),
+        capital(reason(decision.reason))
+    );
+    weighed(&mut page, decision, setting.gamma);
+    views(&mut page, setting, decision);
+    pushes(&mut page, decision, setting.gamma);
+    let scores = &record.scores;
+    let _ = write!(
+        page,
+        "**After the step**\n\n| occupancy IoU | occupied IoU | semantic mIoU | entropy, nats |\n|--:|--:|--:|--:|\n\
+         | {:.3} | {:.3} | {:.3} | {} |\n",
+        scores.occupancy_iou,
+        scores.occupied_iou,
+        scores.semantic_miou,
+        thousands(scores.entropy_nats)
+    );
+    page
+}
+
+fn weighed(page: &mut String, decision: &Decision, gamma: f32) {
+    let sign = |holds: bool| if holds { " ◀" } else { "" };
+    let push = decision.igm + gamma * decision.reg;
+    let (looks, pushed) = (matches!(decision.action, Action::Look { .. }), decision.best_push.is_some());
+    page.push_str("| weighed | nats |\n|:--|--:|\n");
+    let _ = writeln!(page, "| look: IGV, the best two views{} | {:.1} |", sign(looks), decision.igv);
+    if pushed {
+        let _ = writeln!(page, "| push: IGM + γ·Reg{} | {push:.1} |", sign(!looks));
+        let _ = writeln!(page, "|    IGM, the best view after the best push | {:.1} |", decision.igm);
+        let _ = writeln!(page, "|    γ·Reg, what it would blur | {:.1} |", gamma * decision.reg);
+    }
+    page.push('\n');
+}
+
+fn views(page: &mut String, setting: &Setting<'_>, decision: &Decision) {
+    let mut order: Vec<usize> = (0..decision.gains.len()).collect();
+    order.sort_by(|a, b| decision.gains[*b].total_cmp(&decision.gains[*a]).then(a.cmp(b)));
+    page.push_str("**Views**\n\n| view | column, row, target | gain, nats |\n|--:|:--|--:|\n");
+    for &at in order.iter().take(LISTED) {
+        let slot = setting.views.views.get(at).map_or([0; 3], |view| view.slot);
+        let paired = if decision.pair.iter().any(|id| usize::from(id.0) == at) { " ●" } else { "" };
+        let _ = writeln!(
+            page,
+            "| {at}{paired} | {}, {}, {} | {:.1} |",
+            slot[0] + 1,
+            slot[1] + 1,
+            slot[2] + 1,
+            decision.gains[at]
+        );
+    }
+    page.push_str("\n● best pair\n\n");
+}
+
+fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
+    if decision.candidates.is_empty() {
+        return;
+    }
+    let value = |c: &CandidateRecord| c.gain.map(|gain| gain + gamma * c.reg.unwrap_or(0.0));
+    let mut feasible: Vec<(usize, f32, &CandidateRecord)> =
+        decision.candidates.iter().enumerate().filter_map(|(at, c)| Some((at, value(c)?, c))).collect();
+    feasible.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let count = |is: fn(&Rejection) -> bool| {
+        decision.candidates.iter().filter(|c| c.rejection.as_ref().is_some_and(is)).count()
+    };
+    let _ = write!(
+        page,
+        "**Pushes**: {} drawn, {} feasible; {} without a target, {} blocked at the start, {} on the way, {} by the shelf\n\n",
+        decision.candidates.len(),
+        feasible.len(),
+        count(|r| matches!(r, Rejection::NoTarget)),
+        count(|r| matches!(r, Rejection::StartBlocked { .. })),
+        count(|r| matches!(r, Rejection::PathBlocked { .. })),
+        count(|r| matches!(r, Rejection::Shelf)),
+    );
+    if feasible.is_empty() {
+        return;
+    }
+    page.push_str(
+        "| push | from x, y (m) | towards | length | gain | Reg | value, nats |\n|--:|:--|--:|--:|--:|--:|--:|\n",
+    );
+    for (at, value, c) in feasible.iter().take(LISTED) {
+        let best = if decision.best_push == Some(*at) { " ●" } else { "" };
+        let [x, y, _] = c.push.start;
+        let _ = writeln!(
+            page,
+            "| {at}{best} | {x:.2}, {y:.2} | {:.0}° | {:.0} mm | {:.1} | {:.1} | {value:.1} |",
+            c.push.direction_deg,
+            c.push.length_m * 1e3,
+            c.gain.unwrap_or(0.0),
+            c.reg.unwrap_or(0.0)
+        );
+    }
+    page.push('\n');
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// A whole number with its thousands apart.
+fn thousands(number: f64) -> String {
+    let digits = format!("{:.0}", number.max(0.0));
+    let mut text = String::new();
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_grouped() {
+        assert_eq!(thousands(0.2), "0");
+        assert_eq!(thousands(999.6), "1,000");
+        assert_eq!(thousands(1_234_567.0), "1,234,567");
+    }
+}

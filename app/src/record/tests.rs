@@ -1,0 +1,148 @@
+use super::*;
+use crate::fixture;
+
+/// Where a test keeps its output: `NUDGE_KEEP` if that is set, else a directory that goes with the guard.
+fn output() -> (PathBuf, Option<tempfile::TempDir>) {
+    match std::env::var_os("NUDGE_KEEP") {
+        Some(kept) => (kept.into(), None),
+        None => {
+            let directory = tempfile::tempdir().expect("temporary directory");
+            (directory.path().to_owned(), Some(directory))
+        }
+    }
+}
+
+#[test]
+fn a_recording_stays_small_and_names_its_entities() {
+    let steps = 14;
+    let played = fixture::play(steps);
+    let (directory, _guard) = output();
+    let path = directory.join("episode.rrd");
+    let setting = Setting {
+        shelf: &played.record.scene.shelf,
+        catalog: &played.catalog,
+        views: &played.views,
+        budget: steps,
+        gamma: 0.2,
+    };
+    let stream = file_stream(&path, "test").expect("file");
+    let mut recorder = Recorder::bare(stream, "", &path);
+    let plan = picture::FloorPlan::of(&played.record.scene.grid());
+    recorder.check(layout::standard("", plan).send(&recorder.stream, APPLICATION)).expect("layout");
+    recorder.set_up(&setting).expect("static part");
+    let mut sizes = Vec::new();
+    for step in 0..=steps {
+        let scores = step.checked_sub(1).map_or(&played.record.prior, |at| &played.record.steps[at].scores);
+        let state = State {
+            step,
+            bodies: &played.bodies[step],
+            belief: &played.beliefs[step],
+            truth: &played.truths[step],
+            scores,
+        };
+        recorder.state(&setting, &state).expect("state");
+        if let Some(outcome) = step.checked_sub(1).map(|at| &played.outcomes[at]) {
+            recorder.outcome(&setting, &played.beliefs[step], outcome, &[(5, 1.0), (80, 2.0)]).expect("outcome");
+        }
+        recorder.flush().expect("flushed");
+        sizes.push(std::fs::metadata(&path).expect("file").len());
+    }
+    recorder.finish().expect("finished");
+    let total = std::fs::metadata(&path).expect("file").len();
+    let growth: Vec<u64> = sizes.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    assert!(growth.iter().all(|bytes| *bytes > 10_000), "every step reaches the file at once: {growth:?}");
+    assert!(total / steps as u64 <= 1_500_000, "{total} bytes in {steps} steps: {growth:?}");
+    let bytes = std::fs::read(&path).expect("file");
+    assert!(bytes.starts_with(b"RRF2"));
+}
+
+/// A real episode with its figure, for looking at: `NUDGE_KEEP=DIR cargo test -p nudge --lib real_episode -- --ignored`.
+#[test]
+#[ignore = "takes a minute"]
+fn a_real_episode_is_recorded_within_its_budget() {
+    use crate::figure::{Moment, Summary, summary};
+    use nudge_core::belief::Classical;
+    use nudge_core::episode::EpisodeConfig;
+    use nudge_core::plan::{PlannerSettings, PolicyKind};
+    use nudge_core::scene::{GenerateConfig, generate};
+    use std::sync::Arc;
+    let catalog = Arc::new(Catalog::standard());
+    let config = GenerateConfig { fill: [0.32, 0.34], ..GenerateConfig::default() };
+    let mut scene = generate(&catalog, &config, 11).expect("scene");
+    scene.name = "generated shelf".into();
+    let config = EpisodeConfig {
+        policy: PolicyKind::Mem,
+        belief: "classical".into(),
+        seed: 1,
+        budget: 20,
+        views: "standard300".into(),
+        planner: PlannerSettings::default(),
+        noise: None,
+    };
+    let (directory, _guard) = output();
+    let path = directory.join("real.rrd");
+    let mut episode = Episode::new(scene, catalog, config, Arc::new(Classical)).expect("episode");
+    let start = episode.bodies();
+    let mut kept = Vec::new();
+    let mut recording = std::time::Duration::ZERO;
+    let mut recorder = Recorder::create(&path, &episode).expect("recorder");
+    recorder.prior(&episode).expect("prior");
+    while !episode.is_finished() {
+        let outcome = episode.act(episode.decide()).expect("step");
+        let begun = std::time::Instant::now();
+        recorder.step(&episode, &outcome).expect("recorded");
+        recording += begun.elapsed();
+        kept.push((outcome.record.index, episode.belief().clone(), episode.truth().clone()));
+    }
+    recorder.finish().expect("finished");
+    let moments: Vec<Moment<'_>> =
+        [0, 9, 19].iter().map(|&at| Moment { step: kept[at].0, belief: &kept[at].1, truth: &kept[at].2 }).collect();
+    let begun = std::time::Instant::now();
+    let figure =
+        summary(&Summary { record: episode.record(), catalog: episode.catalog(), start: &start, moments: &moments })
+            .expect("figure");
+    let drawing = begun.elapsed();
+    picture::save(&figure, &directory.join("real.png")).expect("saved");
+    let bytes = std::fs::metadata(&path).expect("file").len();
+    println!("recording {recording:?}, figure {drawing:?}, {} bytes a step", bytes / 20);
+    assert!(bytes / 20 <= 1_500_000);
+}
+
+#[test]
+fn entities_are_named_as_the_contract_says() {
+    let names = [
+        (paths::SHELF, "world/shelf"),
+        (paths::CAMERA_VIEWS, "camera/views"),
+        (paths::CAMERA_CURRENT, "camera/current"),
+        (paths::OBSERVATION_DEPTH, "observation/depth"),
+        (paths::OBSERVATION_LABELS, "observation/labels"),
+        (paths::BELIEF_OCCUPANCY, "belief/occupancy"),
+        (paths::BELIEF_SEMANTICS, "belief/semantics"),
+        (paths::BELIEF_ENTROPY, "belief/entropy"),
+        (paths::BELIEF_CERTAINTY, "belief/certainty"),
+        (paths::GAIN_VIEWS, "gain/views"),
+        (paths::GAIN_VOXELS, "gain/voxels"),
+        (paths::PUSH_CANDIDATES, "push/candidates"),
+        (paths::PUSH_CHOSEN, "push/chosen"),
+        (paths::PUSH_SWEPT, "push/swept"),
+        (paths::PREDICTED_OCCUPANCY, "predicted/occupancy"),
+        (paths::PREDICTED_SEMANTICS, "predicted/semantics"),
+        (paths::PREDICTED_CHANGE, "predicted/change"),
+        (paths::DECISION, "decision"),
+        (paths::LOG, "log"),
+    ];
+    for (name, contract) in names {
+        assert_eq!(name, contract);
+    }
+    assert_eq!(paths::object(ObjectId(7)), "world/objects/7");
+    assert_eq!(paths::score("entropy_nats"), "scores/entropy_nats");
+    let (stream, _storage) = RecordingStreamBuilder::new(APPLICATION).memory().expect("stream");
+    assert_eq!(Recorder::bare(stream.clone(), "", Path::new("")).at(paths::LOG).to_string(), "/log");
+    assert_eq!(Recorder::bare(stream, "b", Path::new("")).at(paths::LOG).to_string(), "/b/log");
+}
+
+#[test]
+fn a_directory_that_is_not_there_is_named() {
+    let error = file_stream(Path::new("/nowhere/at/all/episode.rrd"), "x").map(|_| ()).expect_err("no such directory");
+    assert!(error.to_string().starts_with("/nowhere/at/all/episode.rrd: "), "{error}");
+}

@@ -1,0 +1,262 @@
+//! Floor plans: one pixel a floor cell, x to the right, y (into the shelf) up.
+
+use crate::colors::{self, Colormap, Rgb};
+use image::RgbImage;
+use nudge_core::belief::{self, Belief};
+use nudge_core::grid::Grid;
+use nudge_core::scene::{BACKGROUND, CLASS_COUNT, Catalog, ClassId};
+use nudge_core::score::SCORED_HEIGHT_M;
+use nudge_core::world::TruthMap;
+
+/// A floor cell whose likeliest class is not likelier than this has not been told anything.
+const UNKNOWN_BELOW: f32 = 1.05 / CLASS_COUNT as f32;
+
+/// Where floor cells are in a picture: rows run from the back of the shelf to its front edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FloorPlan {
+    /// Cells along x and along y.
+    pub size: [usize; 2],
+}
+
+impl FloorPlan {
+    /// The plan of a grid.
+    pub fn of(grid: &Grid) -> Self {
+        Self { size: [grid.dims[0], grid.dims[1]] }
+    }
+
+    /// Column and row of a cell, by its position in arrays over cells.
+    pub fn pixel(&self, cell: usize) -> [usize; 2] {
+        [cell / self.size[1], self.size[1] - 1 - cell % self.size[1]]
+    }
+
+    /// The cells' positions in the order of the picture's pixels, row by row from the back.
+    pub fn cells(self) -> impl Iterator<Item = usize> {
+        let [width, depth] = self.size;
+        (0..depth).flat_map(move |row| (0..width).map(move |x| x * depth + depth - 1 - row))
+    }
+}
+
+/// A floor plan with a colour for every cell.
+pub fn paint(grid: &Grid, rgb_of_cell: impl Fn(usize) -> Rgb) -> RgbImage {
+    let plan = FloorPlan::of(grid);
+    let bytes = plan.cells().flat_map(rgb_of_cell).collect();
+    RgbImage::from_raw(plan.size[0] as u32, plan.size[1] as u32, bytes).expect("one colour a cell")
+}
+
+/// The likeliest class of a cell, or `None` while nothing is known about it.
+pub fn believed_class(belief: &Belief, cell: usize) -> Option<ClassId> {
+    let (class, certainty) = belief.likeliest(cell);
+    (certainty > UNKNOWN_BELOW).then_some(class)
+}
+
+/// The semantic belief: the likeliest class's colour, paler where it is less certain; palest where nothing is known.
+pub fn paint_semantics(belief: &Belief, catalog: &Catalog) -> RgbImage {
+    paint(&belief.grid, |cell| match believed_class(belief, cell) {
+        None => colors::UNKNOWN_RGB,
+        Some(class) => {
+            let certainty = belief.likeliest(cell).1;
+            colors::mix(colors::UNKNOWN_RGB, colors::of_class(catalog, class), (0.4 + 0.6 * certainty).min(1.0))
+        }
+    })
+}
+
+/// Entropy over every floor cell, nats: the column's voxels in the scored volume and the cell's class. Their sum is
+/// the map's entropy.
+pub fn cell_entropy(belief: &Belief) -> Vec<f32> {
+    let levels = belief.grid.levels_below(SCORED_HEIGHT_M);
+    (0..belief.grid.cell_count())
+        .map(|cell| {
+            let column = &belief.occupancy[belief.grid.column(cell)][..levels];
+            let voxels: f32 = column.iter().map(|a| belief::bernoulli_entropy(belief::beta_mean(*a))).sum();
+            voxels + belief::dirichlet_entropy(&belief.semantics[cell])
+        })
+        .collect()
+}
+
+/// From nothing open to nothing known: the scale of [`cell_entropy`], nats.
+pub fn entropy_range(grid: &Grid) -> [f32; 2] {
+    [0.0, grid.levels_below(SCORED_HEIGHT_M) as f32 * std::f32::consts::LN_2 + (CLASS_COUNT as f32).ln()]
+}
+
+/// [`cell_entropy`] in magma.
+pub fn paint_entropy(belief: &Belief) -> RgbImage {
+    let (entropy, range) = (cell_entropy(belief), entropy_range(&belief.grid));
+    paint(&belief.grid, |cell| Colormap::Magma.of(entropy[cell], range))
+}
+
+/// How a cell's likeliest class compares with the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellError {
+    /// The same.
+    Right,
+    /// Nothing is known, and nothing stands there.
+    Unknown,
+    /// An object stands there that is not believed.
+    Missed,
+    /// An object is believed that does not stand there.
+    Hallucinated,
+    /// An object is believed to be of another class.
+    Confused,
+}
+
+impl CellError {
+    /// All of them, as legends list them.
+    pub const ALL: [Self; 5] = [Self::Right, Self::Unknown, Self::Missed, Self::Hallucinated, Self::Confused];
+
+    /// Its colour: blue for less than there is, orange for more.
+    pub fn rgb(self) -> Rgb {
+        match self {
+            Self::Right => [250, 250, 250],
+            Self::Unknown => colors::UNKNOWN_RGB,
+            Self::Missed => colors::MISSED_RGB,
+            Self::Hallucinated => colors::HALLUCINATED_RGB,
+            Self::Confused => colors::CONFUSED_RGB,
+        }
+    }
+
+    /// Its name in legends.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Unknown => "unknown",
+            Self::Missed => "missed",
+            Self::Hallucinated => "hallucinated",
+            Self::Confused => "wrong class",
+        }
+    }
+}
+
+/// The semantic error of every floor cell.
+pub fn cell_errors(belief: &Belief, truth: &TruthMap) -> Vec<CellError> {
+    truth
+        .labels
+        .iter()
+        .enumerate()
+        .map(|(cell, &label)| match (believed_class(belief, cell), ClassId(label)) {
+            (None, BACKGROUND) => CellError::Unknown,
+            (Some(believed), truth) if believed == truth => CellError::Right,
+            (None | Some(BACKGROUND), _) => CellError::Missed,
+            (Some(_), BACKGROUND) => CellError::Hallucinated,
+            _ => CellError::Confused,
+        })
+        .collect()
+}
+
+/// [`cell_errors`] in their colours.
+pub fn paint_errors(belief: &Belief, truth: &TruthMap) -> RgbImage {
+    let errors = cell_errors(belief, truth);
+    paint(&belief.grid, |cell| errors[cell].rgb())
+}
+
+/// The outlines of the objects on the floor plan: straight runs along cell edges, each from one to another corner in
+/// pixels of the plan.
+pub fn outlines(truth: &TruthMap) -> Vec<[[usize; 2]; 2]> {
+    let [width, depth, _] = truth.dims;
+    let object = |x: isize, row: isize| {
+        let inside = (0..width as isize).contains(&x) && (0..depth as isize).contains(&row);
+        if inside { truth.objects[x as usize * depth + depth - 1 - row as usize] } else { u16::MAX }
+    };
+    let mut runs = Vec::new();
+    // Edges between columns x - 1 and x, then between rows row - 1 and row.
+    for x in 0..=width {
+        let differs = |row: usize| object(x as isize - 1, row as isize) != object(x as isize, row as isize);
+        runs.extend(stretches(depth, differs).map(|[a, b]| [[x, a], [x, b]]));
+    }
+    for row in 0..=depth {
+        let differs = |x: usize| object(x as isize, row as isize - 1) != object(x as isize, row as isize);
+        runs.extend(stretches(width, differs).map(|[a, b]| [[a, row], [b, row]]));
+    }
+    runs
+}
+
+/// The runs of consecutive positions below `count` that `holds` for, each from its first to one past its last.
+fn stretches(count: usize, holds: impl Fn(usize) -> bool) -> impl Iterator<Item = [usize; 2]> {
+    let mut runs: Vec<[usize; 2]> = Vec::new();
+    for at in (0..count).filter(|&at| holds(at)) {
+        match runs.last_mut() {
+            Some(run) if run[1] == at => run[1] = at + 1,
+            _ => runs.push([at, at + 1]),
+        }
+    }
+    runs.into_iter()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nudge_core::grid::Cell;
+
+    /// The inverse of [`FloorPlan::pixel`].
+    fn cell_at(plan: FloorPlan, [x, row]: [usize; 2]) -> Cell {
+        Cell { x: x as u16, y: (plan.size[1] - 1 - row) as u16 }
+    }
+
+    fn grid() -> Grid {
+        Grid::for_shelf([0.06, 0.04, 0.30], 0.01)
+    }
+
+    #[test]
+    fn the_back_of_the_shelf_is_the_top_row() {
+        let (grid, plan) = (grid(), FloorPlan::of(&grid()));
+        let back_right = grid.cell_index(Cell { x: 5, y: 3 });
+        let picture = paint(&grid, |cell| if cell == back_right { [255; 3] } else { [0; 3] });
+        assert_eq!(picture.dimensions(), (6, 4));
+        assert_eq!(picture.get_pixel(5, 0).0, [255; 3]);
+        for (at, cell) in plan.cells().enumerate() {
+            let pixel = [at % 6, at / 6];
+            assert_eq!(plan.pixel(cell), pixel);
+            assert_eq!(grid.cell_index(cell_at(plan, pixel)), cell);
+        }
+    }
+
+    #[test]
+    fn entropy_of_the_cells_adds_up_to_that_of_the_map() {
+        let mut belief = Belief::uniform(grid());
+        belief.occupancy[7] = [9.0, 1.0];
+        belief.semantics[3][2] = 30.0;
+        let sum: f64 = cell_entropy(&belief).iter().map(|h| f64::from(*h)).sum();
+        let map = belief.occupancy_entropy(27) + belief.semantic_entropy();
+        assert!((sum - map).abs() < 1e-3, "{sum} {map}");
+        let uniform = cell_entropy(&Belief::uniform(grid()));
+        assert!((uniform[0] - entropy_range(&grid())[1]).abs() < 1e-4);
+    }
+
+    #[test]
+    fn errors_tell_missed_from_hallucinated() {
+        let grid = grid();
+        let mut belief = Belief::uniform(grid);
+        let mut truth = TruthMap {
+            dims: grid.dims,
+            occupancy: vec![0; grid.voxel_count()],
+            labels: vec![BACKGROUND.0; grid.cell_count()],
+            objects: vec![u16::MAX; grid.cell_count()],
+        };
+        truth.labels[1..5].fill(3);
+        belief.semantics[2][3] = 5.0;
+        belief.semantics[3][4] = 5.0;
+        belief.semantics[4][14] = 5.0;
+        belief.semantics[5][3] = 5.0;
+        belief.semantics[6][14] = 5.0;
+        use CellError::{Confused, Hallucinated, Missed, Right, Unknown};
+        assert_eq!(cell_errors(&belief, &truth)[..7], [Unknown, Missed, Right, Confused, Missed, Hallucinated, Right]);
+    }
+
+    #[test]
+    fn the_outline_of_a_rectangle_is_four_runs() {
+        let grid = grid();
+        let mut truth = TruthMap {
+            dims: grid.dims,
+            occupancy: vec![0; grid.voxel_count()],
+            labels: vec![BACKGROUND.0; grid.cell_count()],
+            objects: vec![u16::MAX; grid.cell_count()],
+        };
+        for x in 1..3 {
+            for y in 0..2 {
+                truth.objects[grid.cell_index(Cell { x, y })] = 0;
+            }
+        }
+        let mut runs = outlines(&truth);
+        runs.sort();
+        assert_eq!(runs, [[[1, 2], [1, 4]], [[1, 2], [3, 2]], [[1, 4], [3, 4]], [[3, 2], [3, 4]]]);
+    }
+}

@@ -1,6 +1,8 @@
 //! The command line: one file per subcommand.
 
+use anyhow::Context;
 use clap::{Parser, Subcommand};
+use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -24,9 +26,8 @@ enum Command {
     Run(run::Args),
     /// Re-run an episode from its log and verify every step
     Replay(replay::Args),
-    /// Make, check and draw scenes
-    #[command(subcommand)]
-    Scene(scene::Command),
+    /// Make, check, generate and draw scenes
+    Scene(scene::Args),
     /// Show what Nudge makes of a mesh
     Mesh(mesh::Args),
     /// Print the poses of a view array
@@ -39,13 +40,12 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Run(args) => run::run(&args),
         Command::Replay(args) => replay::run(&args),
-        Command::Scene(command) => scene::run(&command),
+        Command::Scene(args) => scene::run(&args),
         Command::Mesh(args) => mesh::run(&args),
         Command::Views(args) => views::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("nudge: {error:#}");
             ExitCode::from(error.downcast_ref::<nudge_core::Error>().map_or(2, nudge_core::Error::exit_code))
@@ -53,22 +53,21 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Prints a result on standard output.
-fn print(text: &str) -> std::io::Result<()> {
+/// Writes a result to standard output; a reader that has seen enough (`| head`) is no failure.
+fn print(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())?;
-    if !text.ends_with('\n') {
-        out.write_all(b"\n")?;
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        result => result.context("standard output"),
     }
-    out.flush()
+}
+
+/// A document as indented JSON with a line's end.
+fn to_json(document: &impl Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string_pretty(document)? + "\n")
 }
 
 /// Tells of something on standard error that does not stop the work.
 fn warn(message: &str) {
     eprintln!("warning: {message}");
-}
-
-/// Whether the reader of our output went away (`nudge … | head`), which is no error of ours.
-fn is_closed_pipe(error: &anyhow::Error) -> bool {
-    error.downcast_ref::<std::io::Error>().is_some_and(|io| io.kind() == std::io::ErrorKind::BrokenPipe)
 }

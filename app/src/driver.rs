@@ -5,10 +5,10 @@
 //! calls leaves a directory that [`Driver::resume`] goes on with.
 
 use crate::figure::{Moment, Summary, summary};
-use crate::picture;
+use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Overwrite, Repeated, StepOutcome, resume};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Overwrite, StepOutcome, resume, write_atomically};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::{Body, Catalog, Scene};
 use nudge_core::world::TruthMap;
@@ -27,8 +27,47 @@ pub struct Driver {
     episode: Episode,
     directory: EpisodeDir,
     recorder: Recorder,
+    story: Story,
+}
+
+/// What the summary figure shows beside the log.
+struct Story {
     /// The bodies before the first action.
     start: Vec<Body>,
+    /// Belief and truth after the first action and after half of the budget.
+    moments: Vec<(usize, Belief, TruthMap)>,
+}
+
+impl Story {
+    fn new(episode: &Episode) -> Self {
+        Self { start: episode.bodies(), moments: Vec::new() }
+    }
+
+    /// Takes note of a step if it is one that the figure shows.
+    fn note(&mut self, episode: &Episode) {
+        let (step, half) = (episode.record().steps.len(), episode.record().config.budget.div_ceil(2));
+        if step == 1 || step == half {
+            self.moments.push((step, episode.belief().clone(), episode.truth().clone()));
+        }
+    }
+
+    /// The figure of the episode as it stands.
+    fn figure(&self, episode: &Episode) -> Result<RgbImage> {
+        let last = episode.record().steps.len();
+        let mut moments: Vec<Moment<'_>> = self
+            .moments
+            .iter()
+            .filter(|(step, ..)| *step != last)
+            .map(|(step, belief, truth)| Moment { step: *step, belief, truth })
+            .collect();
+        moments.push(Moment { step: last, belief: episode.belief(), truth: episode.truth() });
+        summary(&Summary {
+            record: episode.record(),
+            catalog: episode.catalog(),
+            start: &self.start,
+            moments: &moments,
+        })
+    }
 }
 
 impl Driver {
@@ -49,11 +88,11 @@ impl Driver {
         let mut recorder = Recorder::create(&out.join(RECORDING), &episode)?;
         recorder.prior(&episode)?;
         directory.write(&mut episode)?;
-        Ok(Self { start: episode.bodies(), episode, directory, recorder })
+        Ok(Self { story: Story::new(&episode), episode, directory, recorder })
     }
 
     /// Goes on with the episode in `out`: repeats and verifies its log, and records it anew on the way.
-    /// `progress` is called with the number of steps repeated and of those in the log.
+    /// `progress` is called with the number of steps repeated.
     ///
     /// # Errors
     /// What [`resume`] refuses.
@@ -61,25 +100,23 @@ impl Driver {
         out: &Path,
         catalog: Arc<Catalog>,
         update: Arc<dyn BeliefUpdate>,
-        progress: &mut dyn FnMut(usize, usize),
+        progress: &mut dyn FnMut(usize),
     ) -> Result<Self> {
-        let mut recorder: Option<Recorder> = None;
-        let mut start = Vec::new();
-        let (directory, episode) = resume(out, catalog, update, &mut |repeated: &Repeated<'_>| {
-            match (&mut recorder, repeated.outcome) {
-                (Some(recorder), Some(outcome)) => recorder.step(repeated.episode, outcome)?,
-                _ => {
-                    let mut fresh = Recorder::create(&out.join(RECORDING), repeated.episode)?;
-                    fresh.prior(repeated.episode)?;
-                    recorder = Some(fresh);
-                    start = repeated.episode.bodies();
-                }
+        let mut begun: Option<(Recorder, Story)> = None;
+        let (directory, episode) = resume(out, catalog, update, &mut |episode, outcome| {
+            if let (Some((recorder, story)), Some(outcome)) = (&mut begun, outcome) {
+                recorder.step(episode, outcome)?;
+                story.note(episode);
+            } else {
+                let mut recorder = Recorder::create(&out.join(RECORDING), episode)?;
+                recorder.prior(episode)?;
+                begun = Some((recorder, Story::new(episode)));
             }
-            progress(repeated.done, repeated.of);
+            progress(episode.record().steps.len());
             Ok(())
         })?;
-        let recorder = recorder.ok_or_else(|| Error::input(out, "", "holds no step to go on from"))?;
-        Ok(Self { episode, directory, recorder, start })
+        let (recorder, story) = begun.ok_or_else(|| Error::input(out, "", "holds no prior to go on from"))?;
+        Ok(Self { episode, directory, recorder, story })
     }
 
     /// The episode.
@@ -104,6 +141,7 @@ impl Driver {
         self.recorder.step(&self.episode, &outcome)?;
         self.episode.add_record_seconds(started.elapsed().as_secs_f64());
         self.directory.write(&mut self.episode)?;
+        self.story.note(&self.episode);
         if let Some(step) = self.episode.record().steps.last() {
             outcome.record.seconds = step.seconds;
         }
@@ -112,27 +150,12 @@ impl Driver {
 
     /// Ends the recording, draws the summary figure beside it, and gives the episode back.
     pub fn finish(self) -> Result<Episode> {
-        let Self { episode, directory, recorder, start } = self;
+        let Self { episode, directory, recorder, story } = self;
         recorder.finish()?;
-        write_summary(&episode, &directory, &start)?;
+        let path = directory.path().join(SUMMARY);
+        write_atomically(&path, &picture::png(&story.figure(&episode)?))?;
         Ok(episode)
     }
-}
-
-/// Draws `summary.png`: maps after the first, the middle and the last step, read back from the directory.
-fn write_summary(episode: &Episode, directory: &EpisodeDir, start: &[Body]) -> Result<()> {
-    let last = episode.record().steps.len();
-    let mut steps = vec![last.min(1), last.div_ceil(2), last];
-    steps.dedup();
-    let moments: Vec<(usize, Belief, TruthMap)> = steps
-        .into_iter()
-        .map(|step| Ok((step, directory.read_belief(step)?, directory.read_truth(step)?.into_map())))
-        .collect::<Result<_>>()?;
-    let moments: Vec<Moment<'_>> =
-        moments.iter().map(|(step, belief, truth)| Moment { step: *step, belief, truth }).collect();
-    let figure =
-        summary(&Summary { record: episode.record(), catalog: episode.catalog(), start, moments: &moments })?;
-    picture::save(&figure, &directory.path().join(SUMMARY))
 }
 
 /// The belief update that a policy runs with: the one named, or the policy's own. Says in the second value what a

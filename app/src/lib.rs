@@ -1,6 +1,14 @@
-//! The workbench's three storeys: [`commands`] (one file per subcommand, thin), `record` (an episode's events become
-//! Rerun entities) and, with the feature `workbench`, the window. The headless run and the window drive the same
-//! [`driver::Driver`], so what a test proves of one holds for the other.
+//! Nudge: the command line, recording to Rerun, pictures and figures.
+//!
+//! [`commands`] has one thin file per subcommand; [`driver`] moves an episode, its directory and its recording one action
+//! at a time; [`record`] turns an episode's events into Rerun entities; [`picture`] draws scenes and floor plans, and
+//! [`figure`] composes them into a slide.
 
+pub mod colors;
 pub mod commands;
 pub mod driver;
+pub mod figure;
+#[cfg(test)]
+mod fixture;
+pub mod picture;
+pub mod record;

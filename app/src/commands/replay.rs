@@ -27,12 +27,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         replay(&directory, Arc::new(Catalog::standard()), update, &mut |done, _| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     if args.json {
-        super::print(&serde_json::to_string_pretty(&report)?)?;
+        super::print(&super::to_json(&report)?)?;
     } else {
         let words = match report.agreement {
             Agreement::BitEqual => "bit for bit".to_owned(),
             Agreement::Within { largest } => format!("within {largest:.1e}"),
-            Agreement::Differs => format!("not at steps {:?}", report.differing_steps),
+            Agreement::Differs => {
+                let steps: Vec<String> = report.differences.iter().map(|at| at.step.to_string()).collect();
+                format!("but at steps {}", steps.join(", "))
+            }
         };
         println!("{}: {} of {} steps run again, the same {words}", args.episode.display(), report.steps, report.budget);
     }

@@ -2,11 +2,11 @@
 
 use crate::driver::{Driver, belief_update, default_out};
 use indicatif::{ProgressBar, ProgressStyle};
-use nudge_core::episode::{EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
+use nudge_core::Error;
+use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
 use nudge_core::plan::{Action, PlannerSettings, PolicyKind, Reason};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::score::{Scores, Verdict};
-use nudge_core::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -68,11 +68,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         noise: None,
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));
-    let mut driver = if args.resume && EpisodeDir::holds_episode(&out)? {
+    let mut driver = if args.resume && EpisodeDir::state(&out)? == DirectoryState::Episode {
         let logged = EpisodeDir::open(&out)?.record()?;
         same_episode(&logged, &scene, &config, &out)?;
         let bar = bar(logged.steps.len(), "repeating");
-        let driver = Driver::resume(&out, catalog, update, &mut |done, _| bar.set_position(done as u64))?;
+        let driver = Driver::resume(&out, catalog, update, &mut |done| bar.set_position(done as u64))?;
         bar.finish_and_clear();
         driver
     } else {
@@ -109,7 +109,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// Refuses to go on with an episode of another scene or with other settings; names the first that differs.
-fn same_episode(logged: &EpisodeRecord, scene: &Scene, config: &EpisodeConfig, out: &std::path::Path) -> Result<(), Error> {
+fn same_episode(
+    logged: &EpisodeRecord,
+    scene: &Scene,
+    config: &EpisodeConfig,
+    out: &std::path::Path,
+) -> Result<(), Error> {
     let settings = |config: &EpisodeConfig| {
         [
             ("--policy", config.policy.to_string()),
@@ -121,7 +126,10 @@ fn same_episode(logged: &EpisodeRecord, scene: &Scene, config: &EpisodeConfig, o
         ]
     };
     if logged.scene != *scene {
-        let message = format!("the episode there is of another scene ({}); leave out --resume or choose another --out", logged.scene.name);
+        let message = format!(
+            "the episode there is of another scene ({}); leave out --resume or choose another --out",
+            logged.scene.name
+        );
         return Err(Error::input(out, "", message));
     }
     for ((name, before), (_, now)) in settings(&logged.config).into_iter().zip(settings(config)) {
@@ -148,7 +156,10 @@ fn print_header(record: &EpisodeRecord) {
         config.seed,
         config.budget
     );
-    println!("{:>6}  {:<34} {:>9}  {:>6}  {:>6}  {:>9}  {:>6}", "step", "action", "gain nats", "IoU", "mIoU", "H nats", "s");
+    println!(
+        "{:>6}  {:<34} {:>9}  {:>6}  {:>6}  {:>9}  {:>6}",
+        "step", "action", "gain nats", "IoU", "mIoU", "H nats", "s"
+    );
     print_row("0", "prior", None, &record.prior, None);
 }
 
@@ -176,7 +187,9 @@ fn print_row(step: &str, action: &str, gain: Option<f32>, scores: &Scores, secon
 /// `look 143`, `look 143 (after the push)`, `push 0.12 m at 75 deg`.
 fn action_words(step: &StepRecord) -> String {
     match step.action {
-        Action::Look { view } if step.decision.reason == Reason::ViewOfPush => format!("look {} (view of the push)", view.0),
+        Action::Look { view } if step.decision.reason == Reason::ViewOfPush => {
+            format!("look {} (view of the push)", view.0)
+        }
         Action::Look { view } => format!("look {}", view.0),
         Action::Push(push) => {
             let [x, y, _] = push.start;
@@ -196,8 +209,14 @@ fn print_summary(record: &EpisodeRecord, out: &std::path::Path) {
     println!("  looks, pushes        {}, {pushes}", record.steps.len() - pushes);
     println!("  occupancy IoU        {:.3} (occupied {:.3})", last.scores.occupancy_iou, last.scores.occupied_iou);
     println!("  semantic mIoU        {:.3}", last.scores.semantic_miou);
-    println!("  mECE                 {:.3} occupancy, {:.3} semantics", last.scores.mece_occupancy, last.scores.mece_semantics);
-    println!("  map entropy          {:.0} nats, {:.0} at the start", last.scores.entropy_nats, record.prior.entropy_nats);
+    println!(
+        "  mECE                 {:.3} occupancy, {:.3} semantics",
+        last.scores.mece_occupancy, last.scores.mece_semantics
+    );
+    println!(
+        "  map entropy          {:.0} nats, {:.0} at the start",
+        last.scores.entropy_nats, record.prior.entropy_nats
+    );
     println!(
         "  objects              {} found, {} misclassified, {} not found, {} hallucinated",
         count(Verdict::Found),

@@ -18,15 +18,15 @@ python: setup
 	@scripts/setup.sh python $(VENV)
 
 demo: setup
-	cargo build --release --locked -p nudge
-	$(NUDGE) run scenes/high/01-box-wall.toml --policy mem --budget 20 --seed 0 --out out/demo --force
+	cargo build --release --locked --workspace
+	$(NUDGE) run scenes/high/box-wall.toml --policy mem --budget 20 --seed 0 --out out/demo --force
 
 test: setup python
 	cargo build --release --locked --workspace
 	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace
 
 bench: setup
-	cargo build --release --locked -p nudge
+	cargo build --release --locked --workspace
 	cargo bench --locked --workspace --bench '*'
 
 lint: setup

@@ -17,7 +17,7 @@ use std::time::Instant;
 
 fn main() {
     let catalog = Arc::new(Catalog::standard());
-    let (scene, _) = Scene::load(&root().join("scenes/high/01-box-wall.toml"), &catalog).expect("scene");
+    let (scene, _) = Scene::load(&root().join("scenes/high/box-wall.toml"), &catalog).expect("scene");
     let array = ViewArray::named("standard300").expect("views");
     println!("{:<58} {:>10}  {:>10}", "two cores, median", "measured", "target");
 
@@ -103,11 +103,16 @@ fn whole_episode() {
     let dir = tempfile::tempdir().expect("tempdir");
     let started = Instant::now();
     let output = Command::new("/usr/bin/env")
-        .args(["bash", "-c", "\"$@\" >/dev/null & pid=$!; peak=0; while kill -0 $pid 2>/dev/null; do \
+        .args([
+            "bash",
+            "-c",
+            "\"$@\" >/dev/null & pid=$!; peak=0; while kill -0 $pid 2>/dev/null; do \
             now=$(awk '/VmHWM/{print $2}' /proc/$pid/status 2>/dev/null || true); \
-            [ -n \"$now\" ] && peak=$now; sleep 0.05; done; wait $pid; echo $peak", "bash"])
+            [ -n \"$now\" ] && peak=$now; sleep 0.05; done; wait $pid; echo $peak",
+            "bash",
+        ])
         .arg(nudge_bin())
-        .args(["run", "scenes/high/01-box-wall.toml", "--policy", "mem", "--belief", "classical", "--seed", "1", "--out"])
+        .args(["run", "scenes/high/box-wall.toml", "--policy", "mem", "--belief", "classical", "--seed", "1", "--out"])
         .arg(dir.path().join("e"))
         .current_dir(root())
         .output()

@@ -44,7 +44,11 @@ fn scenes_that_are_no_scenes() {
         ("class", scene("[[object]]\nclass = \"teapot\"\nposition = [0.0, 0.2]\n"), &["line 6", "teapot"]),
         ("key", scene(&format!("{can}colour = 3\n")), &["line 8", "colour"]),
         ("format", scene("").replace("format = 1", "format = 7"), &["line 1", "format", "7"]),
-        ("nan", scene("[[object]]\nclass = \"tomato_can\"\nposition = [nan, 0.2]\n"), &["line 7", "object 0", "tomato_can"]),
+        (
+            "nan",
+            scene("[[object]]\nclass = \"tomato_can\"\nposition = [nan, 0.2]\n"),
+            &["line 7", "object 0", "tomato_can"],
+        ),
         ("huge", scene("[[object]]\nclass = \"tomato_can\"\nposition = [1e30, 0.2]\n"), &["line 7", "object 0"]),
         ("scale", scene(&format!("{can}scale = [0.0, 1.0, 1.0]\n")), &["line 8", "scale"]),
         ("overlap", scene(&format!("{can}{can}")), &["object 1", "object 0", "overlap"]),
@@ -63,7 +67,8 @@ fn a_scene_without_objects_runs_with_a_warning() {
     let folder = Folder::new();
     let file = folder.write("empty.toml", &scene(""));
     let out = folder.path("out");
-    let output = nudge(&["run", &file, "--belief", "classical", "--budget", "2", "--out", out.to_str().expect("utf-8")]);
+    let output =
+        nudge(&["run", &file, "--belief", "classical", "--budget", "2", "--out", out.to_str().expect("utf-8")]);
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("warning: ") && text(&output.stderr).contains("no objects"));
 }
@@ -100,7 +105,8 @@ fn output_folders_that_cannot_be_written() {
     let folder = Folder::new();
     let file = folder.write("a.toml", &scene("[[object]]\nclass = \"tomato_can\"\nposition = [0.0, 0.2]\n"));
     let blocked = folder.write("file", "not a folder");
-    let line = nudge_fails(2, &["run", &file, "--belief", "classical", "--budget", "1", "--out", &format!("{blocked}/out")]);
+    let line =
+        nudge_fails(2, &["run", &file, "--belief", "classical", "--budget", "1", "--out", &format!("{blocked}/out")]);
     assert!(line.contains(&blocked), "{line}");
     // /dev/full answers every write with "no space left".
     if Path::new("/proc").exists() {
@@ -110,7 +116,8 @@ fn output_folders_that_cannot_be_written() {
     let foreign = folder.path("foreign");
     std::fs::create_dir(&foreign).expect("create");
     std::fs::write(foreign.join("thesis.tex"), "years of work").expect("write");
-    let line = nudge_fails(2, &["run", &file, "--belief", "classical", "--force", "--out", foreign.to_str().expect("utf-8")]);
+    let line =
+        nudge_fails(2, &["run", &file, "--belief", "classical", "--force", "--out", foreign.to_str().expect("utf-8")]);
     assert!(line.contains("foreign"), "{line}");
     assert!(foreign.join("thesis.tex").exists());
 }
@@ -134,7 +141,7 @@ fn truncated_episodes() {
 
 #[test]
 fn wrong_use() {
-    let line = nudge(&["run", "scenes/high/01-box-wall.toml", "--policy", "clever"]);
+    let line = nudge(&["run", "scenes/high/box-wall.toml", "--policy", "clever"]);
     assert_eq!(line.status.code(), Some(2));
     assert!(text(&line.stderr).contains("mem-no-push"), "the known policies are shown: {}", text(&line.stderr));
     assert_eq!(nudge(&["dance"]).status.code(), Some(2));

@@ -6,11 +6,12 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-const SCENE: &str = "scenes/high/01-box-wall.toml";
+const SCENE: &str = "scenes/high/box-wall.toml";
 
 fn run(out: &Path, more: &[&str]) -> Value {
     let out = out.to_str().expect("utf-8");
-    let mut args = vec!["run", SCENE, "--policy", "mem", "--belief", "classical", "--seed", "1", "--out", out, "--json"];
+    let mut args =
+        vec!["run", SCENE, "--policy", "mem", "--belief", "classical", "--seed", "1", "--out", out, "--json"];
     args.extend(more);
     serde_json::from_str(&nudge_ok(&args)).expect("JSON on stdout")
 }
@@ -32,7 +33,11 @@ fn two_runs_agree_and_replay_verifies_them() {
     assert_eq!(timeless(first.clone()), timeless(second));
     for n in 0..=6 {
         let file = format!("beliefs/{n:03}.npz");
-        assert_eq!(std::fs::read(one.join(&file)).expect(&file), std::fs::read(two.join(&file)).expect(&file), "{file}");
+        assert_eq!(
+            std::fs::read(one.join(&file)).expect(&file),
+            std::fs::read(two.join(&file)).expect(&file),
+            "{file}"
+        );
     }
 
     let steps = first["steps"].as_array().expect("steps");
@@ -89,7 +94,11 @@ fn a_killed_run_opens_and_resumes_to_the_same_end() {
     assert_eq!(timeless(resumed), timeless(expected));
     for n in 0..=5 {
         let file = format!("beliefs/{n:03}.npz");
-        assert_eq!(std::fs::read(whole.join(&file)).expect(&file), std::fs::read(cut.join(&file)).expect(&file), "{file}");
+        assert_eq!(
+            std::fs::read(whole.join(&file)).expect(&file),
+            std::fs::read(cut.join(&file)).expect(&file),
+            "{file}"
+        );
     }
 }
 

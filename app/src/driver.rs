@@ -8,7 +8,7 @@ use crate::figure::{Moment, Summary, summary};
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Overwrite, StepOutcome, resume, write_atomically};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Overwrite, StepOutcome, resume};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::{Body, Catalog, Scene};
 use nudge_core::world::TruthMap;
@@ -152,8 +152,7 @@ impl Driver {
     pub fn finish(self) -> Result<Episode> {
         let Self { episode, directory, recorder, story } = self;
         recorder.finish()?;
-        let path = directory.path().join(SUMMARY);
-        write_atomically(&path, &picture::png(&story.figure(&episode)?))?;
+        picture::save(&story.figure(&episode)?, &directory.path().join(SUMMARY))?;
         Ok(episode)
     }
 }

@@ -16,7 +16,8 @@ pub use image::RgbImage;
 pub use light::{Eye, Item, Projection, render};
 pub use stage::{View, of_bodies, of_solid, thumbnail};
 
-use nudge_core::{Error, Result};
+use nudge_core::Result;
+use nudge_core::files::write_atomically;
 use std::path::Path;
 
 /// Writes a picture as a PNG file; a file of that name is replaced at once or not at all.
@@ -24,13 +25,7 @@ use std::path::Path;
 /// # Errors
 /// What the operating system refuses.
 pub fn save(picture: &RgbImage, path: &Path) -> Result<()> {
-    let partial = path.with_extension("png.partial");
-    let written = std::fs::write(&partial, png(picture)).and_then(|()| std::fs::rename(&partial, path));
-    written.map_err(|error| {
-        // Nothing half-written stays behind.
-        let _ = std::fs::remove_file(&partial);
-        Error::io(path, error)
-    })
+    write_atomically(path, &png(picture))
 }
 
 /// A picture as PNG bytes.

@@ -8,7 +8,6 @@
 
 mod directory;
 mod document;
-mod files;
 mod machine;
 mod npz;
 mod record;
@@ -18,7 +17,6 @@ mod resume;
 mod synthetic;
 
 pub use directory::{DirectoryState, EpisodeDir, Overwrite};
-pub use files::write_atomically;
 pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
 pub use record::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};

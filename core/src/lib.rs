@@ -13,6 +13,7 @@ pub mod belief;
 pub mod camera;
 pub mod episode;
 pub mod error;
+pub mod files;
 pub mod gain;
 pub mod grid;
 pub mod plan;

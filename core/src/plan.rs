@@ -195,6 +195,5 @@ impl Default for PlannerSettings {
 }
 
 #[cfg(test)]
-mod measure;
 #[cfg(test)]
 mod tests;

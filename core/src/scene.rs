@@ -19,7 +19,7 @@ mod file_tests;
 pub use body::{Body, ObjectId, Shelf};
 pub use catalog::{BACKGROUND, Background, CLASS_COUNT, Catalog, Class, ClassId, OBJECT_CLASS_COUNT};
 pub use check::{MAX_OBJECTS, MAX_VOXELS};
-pub use file::{FORMAT, write_whole};
+pub use file::FORMAT;
 pub use generate::{GenerateConfig, generate};
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;

@@ -1,4 +1,4 @@
-//! Scores of a belief against the truth: IoU, mIoU, calibration, entropy, object verdicts (`DESIGN.md` section 6).
+//! Scores of a belief against the truth: IoU, mIoU, calibration, entropy, object verdicts.
 //!
 //! Everything is counted in the scored volume, the grid below [`SCORED_HEIGHT_M`], so that the empty air above does not
 //! flatter. [`Scores::of`] judges one belief; a [`Tally`] keeps the counts behind the scores, and tallies merged over a
@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 /// The scored volume is the grid below this height (the tallest class and a margin), metres.
 pub const SCORED_HEIGHT_M: f32 = 0.27;
 
-/// The scores of one belief (`DESIGN.md` section 6).
+/// The scores of one belief.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     /// Mean IoU of free and occupied.

@@ -274,19 +274,4 @@ mod tests {
             prop_assert!(far.is_none(), "{:?} is swept but far from the path", far.map(|v| grid.voxel(v)));
         }
     }
-
-    #[test]
-    #[ignore = "a measurement: cargo test --release -p nudge-core swept_volume_time -- --ignored --nocapture"]
-    fn swept_volume_time() {
-        let (grid, tool) = (grid(), Tool::standard());
-        let start = std::time::Instant::now();
-        let mut voxels = 0;
-        for i in 0..80 {
-            let push =
-                Push { start: [0.004 * i as f32 - 0.16, 0.15, 0.06], direction_deg: 4.5 * i as f32, length_m: 0.1 };
-            voxels += tool.swept_volume(&push, &grid).len();
-        }
-        let seconds = start.elapsed().as_secs_f64();
-        panic!("80 swept volumes of {} voxels on average in {:.2} ms", voxels / 80, seconds * 1e3);
-    }
 }

@@ -4,7 +4,8 @@ use super::{print, to_json, warn};
 use crate::picture::{self, View};
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::camera::{ViewArray, hidden_objects};
-use nudge_core::scene::{Catalog, ClassId, GenerateConfig, Scene, Shelf, generate, write_whole};
+use nudge_core::files::write_atomically;
+use nudge_core::scene::{Catalog, ClassId, GenerateConfig, Scene, Shelf, generate};
 use nudge_core::{Error, rng};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -150,7 +151,7 @@ fn new(args: &NewArgs) -> anyhow::Result<()> {
     if path.exists() && !args.force {
         return Err(Error::input(&path, "", "is there already; --force overwrites it").into());
     }
-    write_whole(&path, text.as_bytes())?;
+    write_atomically(&path, text.as_bytes())?;
     print(&format!("{}\n", path.display()))
 }
 

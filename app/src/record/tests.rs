@@ -55,59 +55,6 @@ fn a_recording_stays_small_and_names_its_entities() {
     let bytes = std::fs::read(&path).expect("file");
     assert!(bytes.starts_with(b"RRF2"));
 }
-
-/// A real episode with its figure, for looking at: `NUDGE_KEEP=DIR cargo test -p nudge --lib real_episode -- --ignored`.
-#[test]
-#[ignore = "takes a minute"]
-fn a_real_episode_is_recorded_within_its_budget() {
-    use crate::figure::{Moment, Summary, summary};
-    use nudge_core::belief::Classical;
-    use nudge_core::episode::EpisodeConfig;
-    use nudge_core::plan::{PlannerSettings, PolicyKind};
-    use nudge_core::scene::{GenerateConfig, generate};
-    use std::sync::Arc;
-    let catalog = Arc::new(Catalog::standard());
-    let config = GenerateConfig { fill: [0.32, 0.34], ..GenerateConfig::default() };
-    let mut scene = generate(&catalog, &config, 11).expect("scene");
-    scene.name = "generated shelf".into();
-    let config = EpisodeConfig {
-        policy: PolicyKind::Mem,
-        belief: "classical".into(),
-        seed: 1,
-        budget: 20,
-        views: "standard300".into(),
-        planner: PlannerSettings::default(),
-        noise: None,
-    };
-    let (directory, _guard) = output();
-    let path = directory.join("real.rrd");
-    let mut episode = Episode::new(scene, catalog, config, Arc::new(Classical)).expect("episode");
-    let start = episode.bodies();
-    let mut kept = Vec::new();
-    let mut recording = std::time::Duration::ZERO;
-    let mut recorder = Recorder::create(&path, &episode).expect("recorder");
-    recorder.prior(&episode).expect("prior");
-    while !episode.is_finished() {
-        let outcome = episode.act(episode.decide()).expect("step");
-        let begun = std::time::Instant::now();
-        recorder.step(&episode, &outcome).expect("recorded");
-        recording += begun.elapsed();
-        kept.push((outcome.record.index, episode.belief().clone(), episode.truth().clone()));
-    }
-    recorder.finish().expect("finished");
-    let moments: Vec<Moment<'_>> =
-        [0, 9, 19].iter().map(|&at| Moment { step: kept[at].0, belief: &kept[at].1, truth: &kept[at].2 }).collect();
-    let begun = std::time::Instant::now();
-    let figure =
-        summary(&Summary { record: episode.record(), catalog: episode.catalog(), start: &start, moments: &moments })
-            .expect("figure");
-    let drawing = begun.elapsed();
-    picture::save(&figure, &directory.join("real.png")).expect("saved");
-    let bytes = std::fs::metadata(&path).expect("file").len();
-    println!("recording {recording:?}, figure {drawing:?}, {} bytes a step", bytes / 20);
-    assert!(bytes / 20 <= 1_500_000);
-}
-
 #[test]
 fn entities_are_named_as_the_contract_says() {
     let names = [

@@ -159,27 +159,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    #[ignore = "a measurement: prints milliseconds per observation of a million voxels"]
-    fn speed_of_an_observation() {
-        let grid = Grid::for_shelf([0.80, 0.40, 0.40], 0.005);
-        let mut seen = nothing_seen(&grid);
-        for index in 0..grid.voxel_count() {
-            match index % 10 {
-                0..5 => seen.free.insert(index),
-                5..7 => seen.occupied.insert(index),
-                _ => (),
-            }
-        }
-        let mut belief = Belief::uniform(grid);
-        let start = std::time::Instant::now();
-        for _ in 0..20 {
-            belief = Classical.observe(&belief, &seen);
-        }
-        println!("observe: {:.1} ms", start.elapsed().as_secs_f64() * 1e3 / 20.0);
-        let start = std::time::Instant::now();
-        let entropy = belief.occupancy_entropy(grid.dims[2]) + belief.semantic_entropy();
-        println!("entropy {entropy:.0} nats: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
-    }
 }

@@ -268,34 +268,3 @@ fn an_object_behind_a_wall_of_boxes_is_hidden() {
     bodies.remove(2);
     assert_eq!(hidden_count(&shelf(), &bodies, &array), 0);
 }
-
-#[test]
-#[ignore = "a measurement"]
-fn camera_times() {
-    let array = standard();
-    let bodies = crowd(20);
-    let shelf = shelf();
-    // Milliseconds on the clock and of all cores together, which is what a busy machine does not change.
-    let cpu_s = || {
-        let stat = std::fs::read_to_string("/proc/self/stat").expect("Linux");
-        let fields: Vec<f64> = stat.split(' ').skip(13).take(2).map(|x| x.parse().expect("ticks")).collect();
-        (fields[0] + fields[1]) / 100.0
-    };
-    let timed = |repeat: u32, run: &dyn Fn()| {
-        let (clock, cpu) = (std::time::Instant::now(), cpu_s());
-        (0..repeat).for_each(|_| run());
-        let per = 1e3 / f64::from(repeat);
-        format!("{:.1} ms ({:.1} ms of cores)", clock.elapsed().as_secs_f64() * per, (cpu_s() - cpu) * per)
-    };
-    let view = &array.views[151];
-    let image = render(&shelf, &bodies, view, &array.intrinsics);
-    let render_ms = timed(50, &|| drop(render(&shelf, &bodies, view, &array.intrinsics)));
-    let project_ms = timed(20, &|| drop(project(&image, view, &array.intrinsics, &shelf)));
-    let noisy_ms = timed(20, &|| drop(NoiseModel::STANDARD.take(&shelf, &bodies, view, &array.intrinsics, 1, 1)));
-    let full_ms = timed(1, &|| drop(visibility(&shelf, &bodies, &array)));
-    let hidden_ms = timed(3, &|| drop(hidden_objects(&shelf, &bodies, &array)));
-    panic!(
-        "render {render_ms}, with noise {noisy_ms}, project {project_ms}; 300 views, 20 objects: \
-         visibility {full_ms}, hidden {hidden_ms}"
-    );
-}

@@ -11,11 +11,11 @@
 //! is killed at any moment leaves a directory that opens and resumes, or, before its first `episode.json`, one that a
 //! new run may start in.
 
-use super::files::{TEMPORARY, names_in, remove_if_there, write_atomically};
 use super::machine::Episode;
 use super::npz::{self, Precision, StoredTruth};
 use super::record::EpisodeRecord;
 use crate::belief::Belief;
+use crate::files::{TEMPORARY, names_in, remove_if_there, write_atomically};
 use crate::grid::Grid;
 use crate::world::TruthMap;
 use crate::{Error, Result};

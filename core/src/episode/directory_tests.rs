@@ -1,6 +1,6 @@
-use super::super::files::cut;
 use super::super::synthetic;
 use super::*;
+use crate::files::cut;
 use std::collections::BTreeMap;
 use tempfile::tempdir;
 

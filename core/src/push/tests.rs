@@ -179,20 +179,3 @@ fn rejections_read_as_they_are_filed() {
     let json = serde_json::to_string(&Rejection::PathBlocked { at: [0.5, 0.25, 0.125] }).expect("json");
     assert_eq!(json, r#"{"kind":"path_blocked","at":[0.5,0.25,0.125]}"#);
 }
-
-#[test]
-#[ignore = "a measurement: prints seconds for 80 feasible candidates"]
-fn speed_of_sampling() {
-    let belief = believed(&[
-        ([-0.30, -0.25, 0.15, 0.20, TALL], 3),
-        ([-0.17, -0.12, 0.07, 0.12, TALL], 4),
-        ([-0.02, 0.05, 0.22, 0.26, 0.12], 5),
-        ([0.20, 0.26, 0.10, 0.16, TALL], 7),
-    ]);
-    let start = std::time::Instant::now();
-    let candidates = sample(&belief, &Tool::standard(), 80, &mut stream(1, "pushes", 0));
-    let feasible = candidates.iter().filter(|c| c.rejection.is_none()).count();
-    println!("{feasible} of {}: {:.3} s", candidates.len(), start.elapsed().as_secs_f64());
-    let swept: &VoxelSet = &candidates[0].swept.swept;
-    println!("swept voxels of the first: {}", swept.len());
-}

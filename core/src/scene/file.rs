@@ -21,11 +21,11 @@
 
 use super::mesh::load_mesh;
 use super::{Catalog, MeshShape, Object, Scene, Shelf, Warning, check};
+use crate::files::write_atomically;
 use crate::{Error, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
@@ -253,37 +253,13 @@ impl Scene {
             let message = format!("mesh of {key}: {} is not there; save beside the meshes", mesh.source);
             return Err(Error::input(path, "", message));
         }
-        write_whole(path, self.to_toml().as_bytes())
+        write_atomically(path, self.to_toml().as_bytes())
     }
 }
 
 /// The folder that a file lies in.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
-}
-
-/// Writes a file whole or not at all: beside its place first, then renamed into it.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let failed = |error| Error::io(path, error);
-    let mut file =
-        tempfile::Builder::new().prefix(".nudge").suffix(".part").tempfile_in(folder_of(path)).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    make_readable(file.as_file()).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
-}
-
-/// Temporary files are private to their owner; a scene is not.
-#[cfg(unix)]
-fn make_readable(file: &std::fs::File) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(std::fs::Permissions::from_mode(0o644))
-}
-
-#[cfg(not(unix))]
-fn make_readable(_file: &std::fs::File) -> std::io::Result<()> {
-    Ok(())
 }
 
 fn check_format(format: Option<&Spanned<toml::Value>>, text: &str, path: &Path) -> Result<()> {

@@ -223,17 +223,4 @@ mod tests {
         };
         (belief, truth)
     }
-
-    #[test]
-    #[ignore = "a measurement: run with --ignored --nocapture"]
-    fn time_of_scoring() {
-        let grid = Grid::for_shelf([0.80, 0.40, 0.40], 0.005);
-        let (belief, truth) = noisy(grid);
-        for (name, belief) in [("noisy", &belief), ("uniform", &Belief::uniform(grid))] {
-            let started = std::time::Instant::now();
-            let times = 20;
-            (0..times).for_each(|_| drop(std::hint::black_box(Tally::of(belief, &truth))));
-            println!("scores of a {name} belief: {:.1} ms", started.elapsed().as_secs_f64() * 1e3 / f64::from(times));
-        }
-    }
 }

@@ -176,27 +176,3 @@ fn pushes_into_a_crowd_stay_sane() {
         }
     }
 }
-
-#[test]
-#[ignore = "a measurement"]
-fn push_time() {
-    let tool = Tool::standard();
-    let mut world = World::new(shelf(), crowd());
-    let start = std::time::Instant::now();
-    world.settle();
-    let settle = start.elapsed().as_secs_f64();
-    let mut worst = 0.0_f64;
-    let start = std::time::Instant::now();
-    for i in 0..12 {
-        let push = Push {
-            start: [-0.33 + 0.06 * i as f32, 0.02, 0.06],
-            direction_deg: 40.0 + 10.0 * i as f32,
-            length_m: 0.15,
-        };
-        let one = std::time::Instant::now();
-        world.clone().execute(&tool, &push);
-        worst = worst.max(one.elapsed().as_secs_f64());
-    }
-    let mean = start.elapsed().as_secs_f64() / 12.0;
-    panic!("15 objects: settle {settle:.3} s, push {mean:.3} s on average, {worst:.3} s at worst");
-}

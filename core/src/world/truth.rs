@@ -181,20 +181,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    #[ignore = "a measurement"]
-    fn truth_time() {
-        let bodies: Vec<Body> = (0..20)
-            .map(|i| {
-                let pose = Pose::translation(-0.32 + 0.16 * (i % 5) as f32, 0.05 + 0.1 * (i / 5) as f32, 0.0);
-                body(i, 3, cylinder(0.04, 0.2), pose)
-            })
-            .collect();
-        let start = std::time::Instant::now();
-        for _ in 0..20 {
-            std::hint::black_box(TruthMap::of(&grid(), &bodies));
-        }
-        panic!("a truth map of 20 bodies in {:.2} ms", start.elapsed().as_secs_f64() * 50.0);
-    }
 }

@@ -353,16 +353,4 @@ mod tests {
         assert!(prediction.change.iter().all(|p| *p < 0.03));
         assert!(prediction.occupancy.iter().all(|a| beta_mean(*a) < 0.05));
     }
-
-    #[test]
-    #[ignore = "a measurement: prints seconds for 80 predictions"]
-    fn speed_of_eighty_predictions() {
-        let (belief, push) = push_into_a_box();
-        let pushes = vec![push; 80];
-        let start = std::time::Instant::now();
-        for chunk in pushes.chunks(16) {
-            assert_eq!(Classical.predict_pushes(&belief, chunk).len(), 16);
-        }
-        println!("80 predictions: {:.3} s", start.elapsed().as_secs_f64());
-    }
 }

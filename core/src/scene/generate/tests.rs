@@ -144,19 +144,3 @@ fn senseless_wishes_are_refused() {
     assert!(refused(GenerateConfig { classes: vec![BACKGROUND], ..base() }).starts_with("class 14"));
     assert!(refused(GenerateConfig { shelf: Shelf::new([9.0, 0.4, 0.4]), ..base() }).contains("shelf size 9 m"));
 }
-
-/// Prints the mean time of a scene: `cargo test --release -p nudge-core scene_takes -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-fn scene_takes_milliseconds() {
-    let catalog = Catalog::standard();
-    for (label, fill, rho) in
-        [("30 to 45 %", [0.30, 0.45], 0.0), ("45 %", [0.45, 0.45], 0.0), ("45 % in line", [0.45, 0.45], 1.0)]
-    {
-        let config = GenerateConfig { fill, rho, ..GenerateConfig::default() };
-        let start = std::time::Instant::now();
-        let objects: usize = (0..50).map(|seed| generate(&catalog, &config, seed).expect("scene").objects.len()).sum();
-        let mean_ms = start.elapsed().as_secs_f64() * 20.0;
-        println!("{label}: {mean_ms:.1} ms a scene of {:.1} objects", objects as f64 / 50.0);
-    }
-}

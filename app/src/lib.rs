@@ -12,3 +12,5 @@ pub mod figure;
 mod fixture;
 pub mod picture;
 pub mod record;
+#[cfg(feature = "workbench")]
+pub mod workbench;

@@ -60,6 +60,16 @@ pub fn paint_semantics(belief: &Belief, catalog: &Catalog) -> RgbImage {
     })
 }
 
+/// The likeliest class's probability (viridis).
+pub fn paint_certainty(belief: &Belief) -> RgbImage {
+    paint(&belief.grid, |cell| Colormap::Viridis.rgb(belief.likeliest(cell).1))
+}
+
+/// Labels in the colours of their classes.
+pub fn paint_labels(grid: &Grid, labels: &[u8], catalog: &Catalog) -> RgbImage {
+    paint(grid, |cell| colors::of_class(catalog, ClassId(labels[cell])))
+}
+
 /// Entropy over every floor cell, nats: the column's voxels in the scored volume and the cell's class. Their sum is
 /// the map's entropy.
 pub fn cell_entropy(belief: &Belief) -> Vec<f32> {

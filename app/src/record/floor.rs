@@ -60,7 +60,7 @@ pub fn classes(belief: &Belief) -> rerun::SegmentationImage {
 
 /// The likeliest class's probability per cell (viridis).
 pub fn certainty(belief: &Belief) -> rerun::Image {
-    picture(&picture::paint(&belief.grid, |cell| Colormap::Viridis.rgb(belief.likeliest(cell).1)))
+    picture(&picture::paint_certainty(belief))
 }
 
 /// Classes after a push where it can reach, unknown elsewhere.

@@ -1,0 +1,5 @@
+//! Authoring a scene.
+
+/// The scene in the making.
+#[derive(Default)]
+pub struct Author {}

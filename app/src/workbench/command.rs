@@ -1,0 +1,132 @@
+//! Everything that a person can ask of the window, in one table: menus, shortcuts, buttons and tests use the same.
+
+use super::model::{LayoutKind, Picked};
+use super::session::SessionId;
+use nudge_core::plan::{Action, Decision};
+use nudge_core::score::Verdict;
+use nudge_core::tool::Push;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Something to do, with what it needs. Panels return these; [`super::app`] carries them out.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Does what a menu entry or a shortcut stands for.
+    Menu(MenuCommand),
+    /// Opens a scene, an episode's directory or a recording.
+    Open(PathBuf),
+    /// Starts an episode of the chosen scene with the chosen policy, seed and budget.
+    Start,
+    /// Shows another open episode.
+    Show(SessionId),
+    /// Closes an open episode; its directory stays.
+    Close(SessionId),
+    /// Chooses the second episode of a comparison.
+    CompareWith(Option<SessionId>),
+    /// Moves the time cursor.
+    GoTo(usize),
+    /// Shows another layout.
+    Layout(LayoutKind),
+    /// Asks the policy what it would do.
+    Decide,
+    /// Does what is pending; asks first if nothing is.
+    DoIt,
+    /// Does something else than the policy would.
+    DoInstead(Action),
+    /// Decides and acts until the budget is used up.
+    Run,
+    /// Stops a run after the step that it is at, or an opening.
+    Cancel,
+    /// Starts an episode that shares the steps up to the cursor.
+    Branch,
+    /// Asks what a push would do to the belief at the cursor.
+    Preview(Push),
+    /// Asks where a view's gain under the belief at the cursor comes from.
+    GainOf(nudge_core::camera::ViewId),
+    /// Asks about a voxel or a floor cell.
+    Pick(Option<Picked>),
+    /// Writes a note on the state at a step; an empty one goes.
+    Note(usize, String),
+    /// Overrules the scorer's verdict on an object at a step, or takes that back.
+    Overrule(usize, String, Option<Verdict>),
+    /// Starts an episode of the scene that is being authored.
+    TryScene,
+    /// Tells of something, as a toast.
+    Tell(Level, String),
+    /// A decision that a test or a script made.
+    Act(Arc<Decision>),
+}
+
+/// How much a message matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Good to know.
+    Info,
+    /// Something is not as asked.
+    Warning,
+    /// Something failed.
+    Error,
+}
+
+/// The entries of the menus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum MenuCommand {
+    /// Opens a scene by the system's dialog.
+    OpenScene,
+    /// Opens an episode's directory by the system's dialog.
+    OpenEpisode,
+    /// Writes notes and verdicts beside the episode, or the scene that is being authored.
+    Save,
+    /// Writes the scene that is being authored under another name.
+    SaveSceneAs,
+    /// Exports the episode with its notes and one self-contained recording.
+    ExportEpisode,
+    /// Exports scores, decisions and verdicts as CSV.
+    ExportTables,
+    /// Exports the window as a picture.
+    ExportPicture,
+    /// Closes the episode that is shown.
+    CloseEpisode,
+    /// Ends the program.
+    Quit,
+    /// Takes the last change of the authored scene back.
+    Undo,
+    /// Does it again.
+    Redo,
+    /// Duplicates the chosen object of the authored scene.
+    Duplicate,
+    /// Deletes the chosen object of the authored scene.
+    Delete,
+    /// One step back.
+    StepBack,
+    /// One step on.
+    StepForward,
+    /// To the prior.
+    First,
+    /// To the last state.
+    Last,
+    /// Asks the policy.
+    Decide,
+    /// Does what is pending.
+    DoIt,
+    /// Runs to the budget.
+    Run,
+    /// Stops.
+    Cancel,
+    /// Branches at the cursor.
+    Branch,
+    /// The layouts, in the order of their tabs.
+    Layout(LayoutKind),
+    /// Light or dark.
+    ToggleTheme,
+    /// Larger text.
+    ZoomIn,
+    /// Smaller text.
+    ZoomOut,
+    /// The panels' sizes as at the first start.
+    ResetLayout,
+    /// The table of shortcuts.
+    Shortcuts,
+    /// Versions and licences.
+    About,
+}

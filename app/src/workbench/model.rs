@@ -1,0 +1,278 @@
+//! What the window shows: the open episodes, the time cursor, and every choice that a person has made. No egui widgets
+//! and no viewer in here, so that tests can look at all of it.
+
+use super::author::Author;
+use super::derive::Derived;
+use super::session::{Moment, Session, SessionId};
+use super::toasts::Toasts;
+use nudge_core::belief::PushPrediction;
+use nudge_core::camera::ViewId;
+use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::tool::Push;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// The layouts, as the tabs at the top right name them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub enum LayoutKind {
+    /// Belief, maps, curves and decision.
+    #[default]
+    Episode,
+    /// The numbers and causes of one voxel or cell.
+    Why,
+    /// The gain of every view.
+    Gains,
+    /// What pushes would do.
+    Push,
+    /// Two episodes on one clock.
+    Compare,
+    /// A scene in the making.
+    Author,
+}
+
+impl LayoutKind {
+    /// All of them, in the order of the tabs.
+    pub const ALL: [Self; 6] = [Self::Episode, Self::Why, Self::Gains, Self::Push, Self::Compare, Self::Author];
+
+    /// The tab's text.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Episode => "Episode",
+            Self::Why => "Why",
+            Self::Gains => "Gains",
+            Self::Push => "Push",
+            Self::Compare => "Compare",
+            Self::Author => "Author",
+        }
+    }
+}
+
+/// What the colour of a drawn voxel says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ColourBy {
+    /// Probability of being occupied (viridis).
+    #[default]
+    Probability,
+    /// Entropy of the voxel, nats (magma).
+    Entropy,
+    /// The likeliest class of its floor cell.
+    Class,
+    /// Where belief and truth differ.
+    Error,
+    /// Change of probability since the step before (blue - white - orange).
+    Change,
+}
+
+impl ColourBy {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Probability, Self::Entropy, Self::Class, Self::Error, Self::Change];
+
+    /// As the choice names it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Probability => "probability",
+            Self::Entropy => "entropy",
+            Self::Class => "class",
+            Self::Error => "error",
+            Self::Change => "change",
+        }
+    }
+}
+
+/// How the belief is drawn in three dimensions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Display {
+    /// What colour says.
+    pub colour_by: ColourBy,
+    /// Voxels with a probability in this range are drawn.
+    pub band: [f32; 2],
+    /// Voxels between these heights above the board are drawn, metres.
+    pub clip_m: [f32; 2],
+    /// The true objects as glass.
+    pub truth: bool,
+    /// The candidate views as frusta.
+    pub views: bool,
+    /// The push candidates as arrows.
+    pub pushes: bool,
+}
+
+impl Default for Display {
+    fn default() -> Self {
+        Self {
+            colour_by: ColourBy::Probability,
+            band: [0.5, 1.0],
+            clip_m: [0.0, 0.40],
+            truth: true,
+            views: true,
+            pushes: false,
+        }
+    }
+}
+
+/// A voxel or a floor cell that a person asks about, by its position in the grid's arrays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Picked {
+    /// A voxel.
+    Voxel(usize),
+    /// A floor cell.
+    Cell(usize),
+}
+
+/// What the pointer is over, to be highlighted in three dimensions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Hovered {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// A view.
+    View(ViewId),
+    /// A push candidate.
+    Push(Push),
+}
+
+/// With what an episode is started.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StartForm {
+    /// The scene's file; none yet at the first start.
+    pub scene: Option<PathBuf>,
+    /// The rule that chooses actions.
+    pub policy: PolicyKind,
+    /// The belief update: `classical` or `cnabu`.
+    pub belief: String,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Number of actions.
+    pub budget: usize,
+    /// The planner's numbers.
+    pub planner: PlannerSettings,
+}
+
+impl Default for StartForm {
+    fn default() -> Self {
+        Self {
+            scene: None,
+            policy: PolicyKind::Mem,
+            belief: "classical".to_owned(),
+            seed: 0,
+            budget: 20,
+            planner: PlannerSettings::default(),
+        }
+    }
+}
+
+/// A belief update asked for, with the push that it is about.
+#[derive(Clone, Debug)]
+pub struct Preview {
+    /// The episode and the step whose belief it starts from.
+    pub of: (SessionId, usize),
+    /// The push.
+    pub push: Push,
+    /// Belief and change that are predicted, with what is swept.
+    pub prediction: Arc<PushPrediction>,
+    /// The voxels that the tool sweeps.
+    pub swept: Arc<nudge_core::grid::VoxelSet>,
+}
+
+/// Where a view's gain comes from.
+#[derive(Clone, Debug)]
+pub struct GainSource {
+    /// The episode and the step whose belief it is about.
+    pub of: (SessionId, usize),
+    /// The view.
+    pub view: ViewId,
+    /// Nats by voxel.
+    pub nats: Arc<Vec<(usize, f32)>>,
+}
+
+/// What is remembered from one start of the program to the next.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Remembered {
+    /// The layout that was shown.
+    pub layout: LayoutKind,
+    /// How the belief is drawn.
+    pub display: Display,
+    /// With what an episode is started.
+    pub form: StartForm,
+    /// What was opened lately, the latest first.
+    pub recent: Vec<PathBuf>,
+    /// Light, where a person asked for it.
+    pub light: bool,
+}
+
+/// Everything that the window shows.
+#[derive(Default)]
+pub struct Model {
+    /// What outlasts the program.
+    pub kept: Remembered,
+    /// The open episodes, in the order of opening.
+    pub sessions: Vec<Session>,
+    /// The one that is shown.
+    pub shown: Option<SessionId>,
+    /// The second one of a comparison.
+    pub other: Option<SessionId>,
+    /// Number of actions after which everything is shown.
+    pub cursor: usize,
+    /// What a person asks about.
+    pub picked: Option<Picked>,
+    /// What the pointer is over.
+    pub hovered: Hovered,
+    /// The view whose gain is explained.
+    pub view: Option<ViewId>,
+    /// The push whose prediction is shown, by its position among the candidates of [`Session::decision_after`].
+    pub candidate: Option<usize>,
+    /// The last answered preview.
+    pub preview: Option<Preview>,
+    /// The last answered gain source.
+    pub gain_source: Option<GainSource>,
+    /// Floor maps and full-precision beliefs of the states that are shown, made in the background.
+    pub derived: BTreeMap<(SessionId, usize), Arc<Derived>>,
+    /// The height of the slice that maps show, metres; `None` for the whole column.
+    pub slice_m: Option<f32>,
+    /// The scene in the making.
+    pub author: Author,
+    /// Messages that fade.
+    pub toasts: Toasts,
+}
+
+impl Model {
+    /// An open episode.
+    pub fn session_of(&self, id: SessionId) -> Option<&Session> {
+        self.sessions.iter().find(|session| session.id == id)
+    }
+
+    /// An open episode, to be changed.
+    pub fn session_of_mut(&mut self, id: SessionId) -> Option<&mut Session> {
+        self.sessions.iter_mut().find(|session| session.id == id)
+    }
+
+    /// The episode that is shown.
+    pub fn session(&self) -> Option<&Session> {
+        self.session_of(self.shown?)
+    }
+
+    /// The second episode of the comparison.
+    pub fn other_session(&self) -> Option<&Session> {
+        self.session_of(self.other?)
+    }
+
+    /// The state at the cursor.
+    pub fn moment(&self) -> Option<&Arc<Moment>> {
+        Some(self.session()?.moment(self.cursor))
+    }
+
+    /// Maps and full belief at the cursor, once they are made.
+    pub fn derived(&self) -> Option<&Arc<Derived>> {
+        let session = self.session()?;
+        self.derived.get(&(session.id, self.cursor.min(session.steps())))
+    }
+
+    /// The same for an episode and a step.
+    pub fn derived_of(&self, id: SessionId, step: usize) -> Option<&Arc<Derived>> {
+        self.derived.get(&(id, step))
+    }
+}

@@ -1,0 +1,131 @@
+//! One open episode as the window sees it: every state it went through, and what is being done with it.
+
+use super::annotations::Annotations;
+use super::half_belief::HalfBelief;
+use nudge_core::belief::BeliefUpdate;
+use nudge_core::camera::ViewArray;
+use nudge_core::episode::{EpisodeRecord, StepOutcome};
+use nudge_core::plan::Decision;
+use nudge_core::scene::{Body, Catalog};
+use nudge_core::score::Scores;
+use nudge_core::tool::Tool;
+use nudge_core::world::TruthMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// An open episode, by the order of opening; never used twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SessionId(pub u32);
+
+/// The state after a number of actions, and the step that led to it.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// Number of actions so far; 0 is the prior.
+    pub step: usize,
+    /// What is believed, in half precision.
+    pub belief: HalfBelief,
+    /// What is; shared by all moments between two pushes.
+    pub truth: Arc<TruthMap>,
+    /// The bodies where they stand, dropped ones left out; shared like the truth.
+    pub bodies: Arc<Vec<Body>>,
+    /// How belief and truth compare.
+    pub scores: Scores,
+    /// What the step brought; `None` for the prior.
+    pub outcome: Option<Arc<StepOutcome>>,
+}
+
+impl Moment {
+    /// What was weighed before the step; `None` for the prior.
+    pub fn decision(&self) -> Option<&Decision> {
+        self.outcome.as_ref().map(|outcome| &outcome.record.decision)
+    }
+}
+
+/// What an episode's worker is at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Activity {
+    /// Waits for an order.
+    #[default]
+    Idle,
+    /// Repeats the log of an episode that is being opened or branched: steps done, steps in all.
+    Opening {
+        /// Steps repeated so far.
+        done: usize,
+        /// Steps in the log.
+        of: usize,
+    },
+    /// Weighs what to do.
+    Deciding,
+    /// Looks or pushes and updates the belief.
+    Acting,
+    /// Runs to the budget.
+    Running,
+}
+
+/// What does not change while an episode is open.
+#[derive(Clone)]
+pub struct Setup {
+    /// Names, shapes and colours of the classes.
+    pub catalog: Arc<Catalog>,
+    /// The candidate views.
+    pub views: Arc<ViewArray>,
+    /// How beliefs change.
+    pub update: Arc<dyn BeliefUpdate>,
+    /// What pushes.
+    pub tool: Arc<Tool>,
+    /// Objects that no view saw at the start, by name.
+    pub hidden: Arc<Vec<String>>,
+}
+
+/// An open episode.
+pub struct Session {
+    /// Its id.
+    pub id: SessionId,
+    /// Its directory.
+    pub path: PathBuf,
+    /// Scene, configuration and the steps so far, as `episode.json` keeps them.
+    pub record: EpisodeRecord,
+    /// What does not change.
+    pub setup: Setup,
+    /// `moments[n]` is the state after `n` actions; never empty.
+    pub moments: Vec<Arc<Moment>>,
+    /// What the policy would do next, once it was asked.
+    pub pending: Option<Arc<Decision>>,
+    /// What the worker is at.
+    pub activity: Activity,
+    /// Notes and verdicts of a person.
+    pub annotations: Annotations,
+    /// Whether something has changed since it was last saved.
+    pub unsaved: bool,
+}
+
+impl Session {
+    /// `tunnel, mem, seed 3`.
+    pub fn title(&self) -> String {
+        format!("{}, {}, seed {}", self.record.scene.name, self.record.config.policy, self.record.config.seed)
+    }
+
+    /// Number of actions done.
+    pub fn steps(&self) -> usize {
+        self.moments.len() - 1
+    }
+
+    /// Whether the budget is used up.
+    pub fn is_finished(&self) -> bool {
+        self.steps() >= self.record.config.budget
+    }
+
+    /// The state after `step` actions, or the last one there is.
+    pub fn moment(&self, step: usize) -> &Arc<Moment> {
+        &self.moments[step.min(self.moments.len() - 1)]
+    }
+
+    /// The decision to explain at `step`: the one that was taken after `step` actions, or, at the last state, the one
+    /// that is pending.
+    pub fn decision_after(&self, step: usize) -> Option<&Decision> {
+        match self.moments.get(step + 1) {
+            Some(next) => next.decision(),
+            None => self.pending.as_deref(),
+        }
+    }
+}

@@ -8,7 +8,7 @@ use crate::figure::{Moment, Summary, summary};
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Overwrite, StepOutcome, resume};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Observer, Overwrite, StepOutcome, resume};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::{Body, Catalog, Scene};
 use nudge_core::world::TruthMap;
@@ -92,7 +92,7 @@ impl Driver {
     }
 
     /// Goes on with the episode in `out`: repeats and verifies its log, and records it anew on the way.
-    /// `progress` is called with the number of steps repeated.
+    /// `watch` is shown the prior and every repeated step.
     ///
     /// # Errors
     /// What [`resume`] refuses.
@@ -100,7 +100,7 @@ impl Driver {
         out: &Path,
         catalog: Arc<Catalog>,
         update: Arc<dyn BeliefUpdate>,
-        progress: &mut dyn FnMut(usize),
+        watch: Observer<'_>,
     ) -> Result<Self> {
         let mut begun: Option<(Recorder, Story)> = None;
         let (directory, episode) = resume(out, catalog, update, &mut |episode, outcome| {
@@ -112,8 +112,7 @@ impl Driver {
                 recorder.prior(episode)?;
                 begun = Some((recorder, Story::new(episode)));
             }
-            progress(episode.record().steps.len());
-            Ok(())
+            watch(episode, outcome)
         })?;
         let (recorder, story) = begun.ok_or_else(|| Error::input(out, "", "holds no prior to go on from"))?;
         Ok(Self { episode, directory, recorder, story })

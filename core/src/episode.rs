@@ -4,7 +4,7 @@
 //! says what the policy would do and changes nothing, [`Episode::act`] does it. A clone is a branch.
 //!
 //! The directory that an episode is written to, step by step, is [`EpisodeDir`]. [`resume`] goes on with a directory
-//! whose run was stopped; [`replay`] runs one again from its log and verifies every step.
+//! whose run was stopped; [`review`] looks at one without writing; [`replay`] runs one again from its log and verifies every step.
 
 mod directory;
 mod document;
@@ -21,4 +21,4 @@ pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
 pub use record::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
-pub use resume::{Observer, resume};
+pub use resume::{Observer, resume, review};

@@ -72,7 +72,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let logged = EpisodeDir::open(&out)?.record()?;
         same_episode(&logged, &scene, &config, &out)?;
         let bar = bar(logged.steps.len(), "repeating");
-        let driver = Driver::resume(&out, catalog, update, &mut |done| bar.set_position(done as u64))?;
+        let driver = Driver::resume(&out, catalog, update, &mut |episode, _| {
+            bar.set_position(episode.record().steps.len() as u64);
+            Ok(())
+        })?;
         bar.finish_and_clear();
         driver
     } else {

@@ -27,6 +27,29 @@ pub fn resume(
     observer: Observer<'_>,
 ) -> Result<(EpisodeDir, Episode)> {
     let directory = EpisodeDir::open_to_write(path.as_ref())?;
+    let episode = retrace(&directory, catalog, update, observer)?;
+    Ok((directory, episode))
+}
+
+/// Opens the episode in `path` to look at it: the same as [`resume`], but nothing is locked or written.
+///
+/// # Errors
+/// Those of [`resume`].
+pub fn review(
+    path: impl AsRef<Path>,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    observer: Observer<'_>,
+) -> Result<Episode> {
+    retrace(&EpisodeDir::open(path.as_ref())?, catalog, update, observer)
+}
+
+fn retrace(
+    directory: &EpisodeDir,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    observer: Observer<'_>,
+) -> Result<Episode> {
     let logged = directory.record()?;
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
     let mut comparison = Comparison::new(0.0);
@@ -39,13 +62,13 @@ pub fn resume(
         } else {
             comparison.prior(&logged, episode.record());
         }
-        comparison.arrays(&directory, &logged, done, &episode)?;
+        comparison.arrays(directory, &logged, done, &episode)?;
         if let Some(difference) = comparison.first_difference() {
-            let place = path.as_ref().display();
+            let place = directory.path().display();
             return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
         }
         observer(&episode, outcome.as_ref())?;
     }
     episode.adopt_log(logged);
-    Ok((directory, episode))
+    Ok(episode)
 }

@@ -1,0 +1,320 @@
+//! An episode's worker: the thread that owns its [`Driver`], takes orders and sends events.
+//!
+//! The window never waits for it. A panic inside an order becomes an [`Event::Panicked`]; what was written to the
+//! episode's directory until then is whole.
+
+use super::half_belief::HalfBelief;
+use super::session::{Activity, Moment, SessionId, Setup};
+use crate::driver::Driver;
+use nudge_core::belief::BeliefUpdate;
+use nudge_core::camera::{ViewArray, hidden_objects};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepOutcome, review};
+use nudge_core::plan::{Action, Decision};
+use nudge_core::scene::{Catalog, ObjectId, Scene};
+use nudge_core::tool::Tool;
+use nudge_core::{Error, Result};
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+/// What a worker begins with.
+pub enum Begin {
+    /// A new episode in a directory that holds none.
+    Start {
+        /// The scene.
+        scene: Box<Scene>,
+        /// Policy, belief, seed, budget.
+        config: Box<EpisodeConfig>,
+        /// Where it is written.
+        out: PathBuf,
+    },
+    /// An episode that is in a directory.
+    Open(PathBuf),
+    /// A new episode that repeats the first steps of another.
+    Branch {
+        /// The other's scene, configuration and steps.
+        of: Box<EpisodeRecord>,
+        /// How many of its steps are shared.
+        steps: usize,
+        /// Where it is written.
+        out: PathBuf,
+    },
+}
+
+/// What a worker can be told.
+pub enum Order {
+    /// Ask the policy; answers with [`Event::Decided`].
+    Decide,
+    /// Do it; answers with [`Event::Stepped`].
+    Act(Arc<Decision>),
+    /// Decide and act until the budget is used up or [`Worker::cancel`] is called.
+    Run,
+}
+
+/// What a worker tells.
+pub enum Event {
+    /// The episode is there.
+    Opened(Box<Opened>),
+    /// What it is at.
+    Activity(Activity),
+    /// What the policy would do.
+    Decided(Arc<Decision>),
+    /// A step is done.
+    Stepped(Arc<Moment>),
+    /// Something could not be done; the episode is as it was.
+    Failed(String),
+    /// The worker broke down; the episode takes no more orders.
+    Panicked(String),
+}
+
+/// An episode that has been opened.
+pub struct Opened {
+    /// Its directory.
+    pub path: PathBuf,
+    /// Scene, configuration, steps.
+    pub record: EpisodeRecord,
+    /// What does not change.
+    pub setup: Setup,
+    /// The states so far.
+    pub moments: Vec<Arc<Moment>>,
+    /// Why nothing more can be done with it, if it can only be looked at.
+    pub read_only: Option<String>,
+}
+
+/// Wakes the window up, after an event was sent.
+pub type Wake = Arc<dyn Fn() + Send + Sync>;
+
+/// The window's end of a worker.
+pub struct Worker {
+    orders: Sender<Order>,
+    cancelled: Arc<AtomicBool>,
+}
+
+impl Worker {
+    /// Starts the thread. Events carry the id, so that all workers can share a channel.
+    pub fn spawn(id: SessionId, begin: Begin, catalog: Arc<Catalog>, events: Sender<(SessionId, Event)>, wake: Wake) -> Self {
+        let (orders, inbox) = channel();
+        let cancelled = Arc::new(AtomicBool::new(false));
+        let post = Post { id, events, wake };
+        let flag = cancelled.clone();
+        std::thread::Builder::new()
+            .name(format!("episode {}", id.0))
+            .spawn(move || {
+                let broke = catch_unwind(AssertUnwindSafe(|| work(begin, catalog, &inbox, &post, &flag)));
+                if let Err(panic) = broke {
+                    post.send(Event::Panicked(words_of(&*panic)));
+                }
+            })
+            .expect("a thread can be started");
+        Self { orders, cancelled }
+    }
+
+    /// Gives an order; one that comes after a breakdown is lost.
+    pub fn order(&self, order: Order) {
+        self.cancelled.store(false, Ordering::Relaxed);
+        let _ = self.orders.send(order);
+    }
+
+    /// Stops a run after its step, or an opening.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.cancel();
+    }
+}
+
+struct Post {
+    id: SessionId,
+    events: Sender<(SessionId, Event)>,
+    wake: Wake,
+}
+
+impl Post {
+    fn send(&self, event: Event) {
+        // Nobody listens any more once the window is closed.
+        let _ = self.events.send((self.id, event));
+        (self.wake)();
+    }
+}
+
+/// A panic's own words.
+fn words_of(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+    text.unwrap_or("no reason was given").to_owned()
+}
+
+/// An episode that goes on, or one that can only be looked at.
+enum Track {
+    Writing(Box<Driver>),
+    Reading,
+}
+
+fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Post, cancelled: &AtomicBool) {
+    let (mut track, mut latest) = match open(begin, catalog, post, cancelled) {
+        Ok((track, opened)) => {
+            let latest = opened.moments.last().expect("there is a prior").clone();
+            post.send(Event::Opened(Box::new(opened)));
+            (track, latest)
+        }
+        Err(error) => return post.send(Event::Failed(error.to_string())),
+    };
+    post.send(Event::Activity(Activity::Idle));
+    while let Ok(order) = inbox.recv() {
+        let Track::Writing(driver) = &mut track else {
+            post.send(Event::Failed("this episode can only be looked at; branch from it to go on".to_owned()));
+            continue;
+        };
+        let done = match order {
+            Order::Decide => {
+                post.send(Event::Activity(Activity::Deciding));
+                post.send(Event::Decided(Arc::new(driver.decide())));
+                Ok(())
+            }
+            Order::Act(decision) => {
+                post.send(Event::Activity(Activity::Acting));
+                act(driver, (*decision).clone(), &mut latest, post)
+            }
+            Order::Run => run(driver, &mut latest, post, cancelled),
+        };
+        if let Err(error) = done {
+            post.send(Event::Failed(error.to_string()));
+        }
+        post.send(Event::Activity(Activity::Idle));
+    }
+    // The window has let go of the episode: end the recording and draw its figure.
+    if let Track::Writing(driver) = track
+        && !driver.episode().record().steps.is_empty()
+    {
+        let _ = driver.finish();
+    }
+}
+
+fn run(driver: &mut Driver, latest: &mut Arc<Moment>, post: &Post, cancelled: &AtomicBool) -> Result<()> {
+    while !driver.episode().is_finished() && !cancelled.load(Ordering::Relaxed) {
+        post.send(Event::Activity(Activity::Running));
+        let decision = driver.decide();
+        post.send(Event::Decided(Arc::new(decision.clone())));
+        if cancelled.load(Ordering::Relaxed) {
+            break;
+        }
+        act(driver, decision, latest, post)?;
+    }
+    Ok(())
+}
+
+fn act(driver: &mut Driver, decision: Decision, latest: &mut Arc<Moment>, post: &Post) -> Result<()> {
+    let outcome = driver.act(decision)?;
+    *latest = Arc::new(moment(driver.episode(), Some(outcome), Some(latest)));
+    post.send(Event::Stepped(latest.clone()));
+    Ok(())
+}
+
+/// The state of an episode and what led to it; what has not changed since `before` is shared with it.
+fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Moment>) -> Moment {
+    let pushed = outcome.as_ref().is_none_or(|outcome| matches!(outcome.record.action, Action::Push(_)));
+    let shared = before.filter(|_| !pushed);
+    Moment {
+        step: episode.record().steps.len(),
+        belief: HalfBelief::of(episode.belief()),
+        truth: shared.map_or_else(|| Arc::new(episode.truth().clone()), |before| before.truth.clone()),
+        bodies: shared.map_or_else(|| Arc::new(episode.bodies()), |before| before.bodies.clone()),
+        scores: outcome.as_ref().map_or(episode.record().prior, |outcome| outcome.record.scores),
+        outcome: outcome.map(Arc::new),
+    }
+}
+
+fn update_named(name: &str, config: &EpisodeConfig) -> Result<Arc<dyn BeliefUpdate>> {
+    Ok(crate::driver::belief_update(Some(name), config.policy)?.0)
+}
+
+fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool) -> Result<(Track, Opened)> {
+    match begin {
+        Begin::Start { scene, config, out } => {
+            let update = update_named(&config.belief, &config)?;
+            let driver = Driver::start(*scene, catalog, *config, update, &out, Overwrite::Refuse)?;
+            let moments = vec![Arc::new(moment(driver.episode(), None, None))];
+            let opened = opened(&out, driver.episode(), moments, None)?;
+            Ok((Track::Writing(Box::new(driver)), opened))
+        }
+        Begin::Branch { of, steps, out } => {
+            let update = update_named(&of.config.belief, &of.config)?;
+            let mut driver = Driver::start(of.scene, catalog, of.config, update, &out, Overwrite::Refuse)?;
+            let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
+            for (done, step) in of.steps.into_iter().take(steps).enumerate() {
+                progress(post, cancelled, done, steps)?;
+                let outcome = driver.act(step.decision)?;
+                let next = moment(driver.episode(), Some(outcome), moments.last().map(|moment| &**moment));
+                moments.push(Arc::new(next));
+            }
+            let opened = opened(&out, driver.episode(), moments, None)?;
+            Ok((Track::Writing(Box::new(driver)), opened))
+        }
+        Begin::Open(path) => {
+            let record = EpisodeDir::open(&path)?.record()?;
+            let update = update_named(&record.config.belief, &record.config)?;
+            let of = record.steps.len();
+            let mut moments = Vec::with_capacity(of + 1);
+            match Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, cancelled, of, &mut moments)) {
+                Ok(driver) => {
+                    let opened = opened(&path, driver.episode(), moments, None)?;
+                    Ok((Track::Writing(Box::new(driver)), opened))
+                }
+                Err(refused @ (Error::Io { .. } | Error::Input { .. })) => {
+                    // A directory that cannot be written, or that another run is writing, can still be looked at.
+                    moments.clear();
+                    let episode = review(&path, catalog, update, &mut watch(post, cancelled, of, &mut moments))?;
+                    Ok((Track::Reading, opened(&path, &episode, moments, Some(refused.to_string()))?))
+                }
+                Err(error) => Err(error),
+            }
+        }
+    }
+}
+
+/// Keeps every state of an episode that is being repeated, and tells how far it is.
+fn watch<'a>(
+    post: &'a Post,
+    cancelled: &'a AtomicBool,
+    of: usize,
+    moments: &'a mut Vec<Arc<Moment>>,
+) -> impl FnMut(&Episode, Option<&StepOutcome>) -> Result<()> + 'a {
+    move |episode, outcome| {
+        progress(post, cancelled, episode.record().steps.len(), of)?;
+        let next = moment(episode, outcome.cloned(), moments.last().map(|moment| &**moment));
+        moments.push(Arc::new(next));
+        Ok(())
+    }
+}
+
+fn progress(post: &Post, cancelled: &AtomicBool, done: usize, of: usize) -> Result<()> {
+    if cancelled.load(Ordering::Relaxed) {
+        return Err(Error::Usage("cancelled".to_owned()));
+    }
+    post.send(Event::Activity(Activity::Opening { done, of }));
+    Ok(())
+}
+
+fn opened(path: &Path, episode: &Episode, moments: Vec<Arc<Moment>>, read_only: Option<String>) -> Result<Opened> {
+    let record = episode.record().clone();
+    let views = ViewArray::named(&record.config.views)?;
+    let hidden = hidden_objects(&record.scene.shelf, &moments[0].bodies, &views);
+    let name = |id: &ObjectId| {
+        let object = record.scene.objects.get(usize::from(id.0));
+        format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
+    };
+    let setup = Setup {
+        catalog: Arc::new(episode.catalog().clone()),
+        views: Arc::new(views),
+        update: update_named(&record.config.belief, &record.config)?,
+        tool: Arc::new(Tool::standard()),
+        hidden: Arc::new(hidden.iter().map(name).collect()),
+    };
+    Ok(Opened { path: path.to_owned(), record, setup, moments, read_only })
+}

@@ -1,7 +1,7 @@
 use super::*;
 use crate::Point;
 use crate::belief::evidence;
-use crate::grid::{Grid, VoxelSet};
+use crate::grid::Grid;
 use crate::rng::stream;
 
 /// A shelf believed free but for boxes `[x0, x1, y0, y1, height]` (metres), each with its class on its cells.

@@ -47,12 +47,12 @@ fn scenes_that_are_no_scenes() {
         (
             "nan",
             scene("[[object]]\nclass = \"tomato_can\"\nposition = [nan, 0.2]\n"),
-            &["line 7", "object 0", "tomato_can"],
+            &["line 7", "object 1", "tomato_can"],
         ),
-        ("huge", scene("[[object]]\nclass = \"tomato_can\"\nposition = [1e30, 0.2]\n"), &["line 7", "object 0"]),
+        ("huge", scene("[[object]]\nclass = \"tomato_can\"\nposition = [1e30, 0.2]\n"), &["line 7", "object 1"]),
         ("scale", scene(&format!("{can}scale = [0.0, 1.0, 1.0]\n")), &["line 8", "scale"]),
-        ("overlap", scene(&format!("{can}{can}")), &["object 1", "object 0", "overlap"]),
-        ("outside", scene("[[object]]\nclass = \"tomato_can\"\nposition = [0.39, 0.2]\n"), &["object 0", "outside"]),
+        ("overlap", scene(&format!("{can}{can}")), &["object 2", "object 1", "overlap"]),
+        ("outside", scene("[[object]]\nclass = \"tomato_can\"\nposition = [0.39, 0.2]\n"), &["object 1", "outside"]),
         ("shelf", scene("").replace("[0.8, 0.4, 0.4]", "[800.0, 400.0, 400.0]"), &["size"]),
     ];
     for (name, content, words) in cases {

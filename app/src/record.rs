@@ -7,13 +7,13 @@
 //!
 //! Entity names are in [`paths`] and nowhere else.
 
-mod blueprint;
-mod decision;
+pub(crate) mod blueprint;
+pub(crate) mod decision;
 mod floor;
-mod layout;
+pub(crate) mod layout;
 pub mod paths;
-mod shapes;
-mod voxels;
+pub(crate) mod shapes;
+pub(crate) mod voxels;
 
 use crate::picture;
 use nudge_core::belief::{Belief, PushPrediction};

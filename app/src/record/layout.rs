@@ -113,7 +113,7 @@ fn root_or_slash(root: &str) -> &str {
 }
 
 /// A view into the shelf from the robot's side, slightly above, with a 10 cm grid on the board.
-fn spatial(name: &str, root: &str, contents: Vec<String>) -> View {
+pub(crate) fn spatial(name: &str, root: &str, contents: Vec<String>) -> View {
     let eye = bp::EyeControls3D::new()
         .with_kind(bpc::Eye3DKind::Orbital)
         .with_position([0.0, -0.78, 0.60])

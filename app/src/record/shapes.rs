@@ -1,7 +1,7 @@
 //! Bodies, cameras and pushes as meshes, lines, images and arrows.
 
 use crate::colors::{self, Colormap, Rgb};
-use nudge_core::camera::{Image, Intrinsics, ViewArray};
+use nudge_core::camera::{Image, Intrinsics, View, ViewArray};
 use nudge_core::plan::Decision;
 use nudge_core::scene::{Body, Catalog, Shelf};
 use nudge_core::solid::ConvexPart;
@@ -12,9 +12,9 @@ use nudge_core::{Point, Pose, Vector};
 const IMAGE_STEP: usize = 2;
 /// Facets whose normals differ by less than this (cosine) are shaded as one rounded surface.
 const ROUND_COS: f32 = 0.86;
-const REJECTED_RGB: Rgb = [120, 122, 128];
-const CHOSEN_RGB: Rgb = [255, 112, 67];
-const GLASS_ALPHA: u8 = 52;
+pub(crate) const REJECTED_RGB: Rgb = [120, 122, 128];
+pub(crate) const CHOSEN_RGB: Rgb = [255, 112, 67];
+pub(crate) const GLASS_ALPHA: u8 = 52;
 
 /// A pose as Rerun's transform.
 pub fn transform(world_from: &Pose) -> rerun::Transform3D {
@@ -29,9 +29,9 @@ pub fn glass(body: &Body, catalog: &Catalog) -> rerun::Mesh3D {
     mesh(&body.solid.parts).with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(r, g, b, GLASS_ALPHA))
 }
 
-/// Convex parts with normals that round the facets of curved surfaces and keep edges.
-fn mesh(parts: &[ConvexPart]) -> rerun::Mesh3D {
-    let (mut positions, mut normals) = (Vec::<[f32; 3]>::new(), Vec::<[f32; 3]>::new());
+/// The corners of convex parts' triangles with normals that round the facets of curved surfaces and keep edges.
+pub(crate) fn facets(parts: &[ConvexPart]) -> Vec<(Point, Vector)> {
+    let mut corners = Vec::new();
     for part in parts {
         let face = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|i| part.vertices[i as usize]);
@@ -46,13 +46,20 @@ fn mesh(parts: &[ConvexPart]) -> rerun::Mesh3D {
                     .map(face)
                     .filter(|normal| normal.dot(&own) > ROUND_COS * normal.norm())
                     .fold(Vector::zeros(), |sum, normal| sum + normal);
-                positions.push(part.vertices[corner as usize].coords.into());
-                normals.push(sum.try_normalize(1e-12).unwrap_or(own).into());
+                corners.push((part.vertices[corner as usize], sum.try_normalize(1e-12).unwrap_or(own)));
             }
         }
     }
-    let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
-    rerun::Mesh3D::new(positions).with_vertex_normals(normals).with_triangle_indices(triangles)
+    corners
+}
+
+/// Convex parts as a mesh.
+fn mesh(parts: &[ConvexPart]) -> rerun::Mesh3D {
+    let corners = facets(parts);
+    let triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
+    rerun::Mesh3D::new(corners.iter().map(|(position, _)| <[f32; 3]>::from(position.coords)))
+        .with_vertex_normals(corners.iter().map(|(_, normal)| <[f32; 3]>::from(*normal)))
+        .with_triangle_indices(triangles)
 }
 
 /// Board, back and sides of a shelf as thin panels outside the interior; no ceiling, so that one can look in.
@@ -92,18 +99,25 @@ pub fn shelf_edges(shelf: &Shelf) -> rerun::LineStrips3D {
 /// Every view as a small frustum, one line each.
 pub fn view_frusta(array: &ViewArray) -> rerun::LineStrips3D {
     const DEPTH_M: f32 = 0.016;
-    let half = [array.intrinsics.width, array.intrinsics.height].map(|n| 0.5 * n as f32 / array.intrinsics.focal_px);
-    let strips = array.views.iter().map(|view| {
-        let place = |x: f32, y: f32, z: f32| -> [f32; 3] {
-            let point = view.world_from_camera * Point::new(x * half[0] * DEPTH_M, y * half[1] * DEPTH_M, z * DEPTH_M);
-            point.coords.into()
-        };
-        let [apex, a, b, c, d] =
-            [place(0.0, 0.0, 0.0), place(-1., -1., 1.), place(1., -1., 1.), place(1., 1., 1.), place(-1., 1., 1.)];
-        [apex, a, b, apex, c, d, apex, d, a, b, c]
-    });
+    let strips = array.views.iter().map(|view| frustum_line(view, &array.intrinsics, DEPTH_M));
     // No colours here: static ones would hide those of the steps.
     rerun::LineStrips3D::new(strips).with_radii([rerun::Radius::new_ui_points(0.7)])
+}
+
+/// One view as a frustum of the given depth, metres.
+pub(crate) fn frustum(view: &View, intrinsics: &Intrinsics, depth_m: f32) -> rerun::LineStrips3D {
+    rerun::LineStrips3D::new([frustum_line(view, intrinsics, depth_m)])
+}
+
+fn frustum_line(view: &View, intrinsics: &Intrinsics, depth_m: f32) -> [[f32; 3]; 11] {
+    let half = [intrinsics.width, intrinsics.height].map(|n| 0.5 * n as f32 / intrinsics.focal_px);
+    let place = |x: f32, y: f32, z: f32| -> [f32; 3] {
+        let point = view.world_from_camera * Point::new(x * half[0] * depth_m, y * half[1] * depth_m, z * depth_m);
+        point.coords.into()
+    };
+    let [apex, a, b, c, d] =
+        [place(0.0, 0.0, 0.0), place(-1., -1., 1.), place(1., -1., 1.), place(1., 1., 1.), place(-1., 1., 1.)];
+    [apex, a, b, apex, c, d, apex, d, a, b, c]
 }
 
 /// The scale of a step's gains, nats: from nothing to the best view's.

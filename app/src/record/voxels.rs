@@ -18,7 +18,7 @@ const DECIDED: f32 = 0.35;
 
 /// The voxels of a set that show from outside: those with a face neighbour beyond the set. The board counts as more
 /// of the set, since nobody looks from below.
-fn surface(grid: &Grid, inside: &[bool]) -> Vec<usize> {
+pub(crate) fn surface(grid: &Grid, inside: &[bool]) -> Vec<usize> {
     let [width, depth, height] = grid.dims;
     let strides = [depth * height, height, 1];
     let mut shown = Vec::new();
@@ -37,7 +37,7 @@ fn surface(grid: &Grid, inside: &[bool]) -> Vec<usize> {
 }
 
 /// The voxels at `indices` in place.
-fn map(grid: &Grid, indices: &[usize]) -> VoxelGridMap {
+pub(crate) fn map(grid: &Grid, indices: &[usize]) -> VoxelGridMap {
     let positions = indices.iter().map(|&index| {
         let Voxel { x, y, z } = grid.voxel(index);
         [i32::from(x), i32::from(y), i32::from(z)]
@@ -45,7 +45,7 @@ fn map(grid: &Grid, indices: &[usize]) -> VoxelGridMap {
     VoxelGridMap::new(positions.map(rerun::datatypes::IVec3D), [grid.voxel_m; 3]).with_translation(grid.origin)
 }
 
-fn colored(grid: &Grid, indices: &[usize], rgb: impl Fn(usize) -> Rgb) -> VoxelGridMap {
+pub(crate) fn colored(grid: &Grid, indices: &[usize], rgb: impl Fn(usize) -> Rgb) -> VoxelGridMap {
     map(grid, indices).with_colors(indices.iter().map(|&index| rerun::Color::from(rgb(index))))
 }
 

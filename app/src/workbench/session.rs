@@ -93,6 +93,8 @@ pub struct Session {
     pub pending: Option<Arc<Decision>>,
     /// What the worker is at.
     pub activity: Activity,
+    /// Why nothing more can be done with it, if it can only be looked at.
+    pub read_only: Option<String>,
     /// Notes and verdicts of a person.
     pub annotations: Annotations,
     /// Whether something has changed since it was last saved.

@@ -1,0 +1,227 @@
+//! The menus: text, tooltip and shortcut of every entry, in one table.
+
+use super::command::MenuCommand as M;
+use super::model::{LayoutKind, Model};
+use super::session::Activity;
+use rerun::external::egui::{Key, KeyboardShortcut, Modifiers};
+
+/// A menu with its entries; `None` is a line between them.
+pub const MENUS: [(&str, &[Option<M>]); 5] = [
+    (
+        "File",
+        &[
+            Some(M::OpenScene),
+            Some(M::OpenEpisode),
+            None,
+            Some(M::Save),
+            Some(M::SaveSceneAs),
+            None,
+            Some(M::ExportEpisode),
+            Some(M::ExportTables),
+            Some(M::ExportPicture),
+            None,
+            Some(M::CloseEpisode),
+            Some(M::Quit),
+        ],
+    ),
+    ("Edit", &[Some(M::Undo), Some(M::Redo), None, Some(M::Duplicate), Some(M::Delete)]),
+    (
+        "View",
+        &[
+            Some(M::Layout(LayoutKind::Episode)),
+            Some(M::Layout(LayoutKind::Why)),
+            Some(M::Layout(LayoutKind::Gains)),
+            Some(M::Layout(LayoutKind::Push)),
+            Some(M::Layout(LayoutKind::Compare)),
+            Some(M::Layout(LayoutKind::Author)),
+            None,
+            Some(M::ToggleTheme),
+            Some(M::ZoomIn),
+            Some(M::ZoomOut),
+            Some(M::ResetLayout),
+        ],
+    ),
+    (
+        "Episode",
+        &[
+            Some(M::Decide),
+            Some(M::DoIt),
+            Some(M::Run),
+            Some(M::Cancel),
+            None,
+            Some(M::First),
+            Some(M::StepBack),
+            Some(M::StepForward),
+            Some(M::Last),
+            None,
+            Some(M::Branch),
+        ],
+    ),
+    ("Help", &[Some(M::Shortcuts), Some(M::About)]),
+];
+
+impl M {
+    /// All entries, in the order of the menus.
+    pub fn all() -> impl Iterator<Item = Self> {
+        MENUS.iter().flat_map(|(_, entries)| entries.iter().flatten().copied())
+    }
+
+    /// The entry's text; an ellipsis where more is asked for.
+    pub fn title(self) -> &'static str {
+        match self {
+            M::OpenScene => "Open scene…",
+            M::OpenEpisode => "Open episode…",
+            M::Save => "Save",
+            M::SaveSceneAs => "Save scene as…",
+            M::ExportEpisode => "Export episode…",
+            M::ExportTables => "Export tables…",
+            M::ExportPicture => "Export picture…",
+            M::CloseEpisode => "Close episode",
+            M::Quit => "Quit",
+            M::Undo => "Undo",
+            M::Redo => "Redo",
+            M::Duplicate => "Duplicate object",
+            M::Delete => "Delete object",
+            M::StepBack => "Step back",
+            M::StepForward => "Step forward",
+            M::First => "First step",
+            M::Last => "Last step",
+            M::Decide => "Decide",
+            M::DoIt => "Do it",
+            M::Run => "Run",
+            M::Cancel => "Cancel",
+            M::Branch => "Branch from here",
+            M::Layout(layout) => layout.title(),
+            M::ToggleTheme => "Light or dark",
+            M::ZoomIn => "Zoom in",
+            M::ZoomOut => "Zoom out",
+            M::ResetLayout => "Reset layout",
+            M::Shortcuts => "Keyboard shortcuts",
+            M::About => "About Nudge",
+        }
+    }
+
+    /// What it does, in a sentence.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            M::OpenScene => "Choose a scene file (.toml) to start an episode of",
+            M::OpenEpisode => "Choose an episode's directory, or a recording (.rrd), to look at or go on with",
+            M::Save => "Write notes and verdicts beside the episode, or the scene that is being authored",
+            M::SaveSceneAs => "Write the scene that is being authored to another file",
+            M::ExportEpisode => "Write the episode with its notes as one directory and one self-contained recording",
+            M::ExportTables => "Write scores, decisions and verdicts as CSV",
+            M::ExportPicture => "Write the window as a PNG",
+            M::CloseEpisode => "Close the episode that is shown; its directory stays",
+            M::Quit => "End the program; asks first if notes or a scene are not saved",
+            M::Undo => "Take the last change of the scene back",
+            M::Redo => "Make the change again",
+            M::Duplicate => "Put a copy of the chosen object beside it",
+            M::Delete => "Take the chosen object away",
+            M::StepBack => "Show the state one action earlier",
+            M::StepForward => "Show the state one action later",
+            M::First => "Show the state before the first action",
+            M::Last => "Show the latest state",
+            M::Decide => "Ask the policy what it would do next, and show what it weighed",
+            M::DoIt => "Do what was decided; decides first if nothing was",
+            M::Run => "Decide and act until the budget is used up",
+            M::Cancel => "Stop after the action that is under way",
+            M::Branch => "Start an episode that shares the actions up to the cursor; both stay open",
+            M::Layout(LayoutKind::Episode) => "Belief, floor maps, score curves and the decision",
+            M::Layout(LayoutKind::Why) => "The numbers, history and causes of one voxel or floor cell",
+            M::Layout(LayoutKind::Gains) => "What every view would tell, in nats",
+            M::Layout(LayoutKind::Push) => "What a push would do, and what it did",
+            M::Layout(LayoutKind::Compare) => "Two episodes on one clock",
+            M::Layout(LayoutKind::Author) => "Make a scene",
+            M::ToggleTheme => "Switch between the light and the dark theme",
+            M::ZoomIn => "Larger text and controls",
+            M::ZoomOut => "Smaller text and controls",
+            M::ResetLayout => "Panels as wide as at the first start",
+            M::Shortcuts => "Every command that has a key",
+            M::About => "Versions and licences",
+        }
+    }
+
+    /// Its keys.
+    pub fn shortcut(self) -> Option<KeyboardShortcut> {
+        let command = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND, key));
+        let shifted = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND | Modifiers::SHIFT, key));
+        let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
+        match self {
+            M::OpenScene => command(Key::O),
+            M::OpenEpisode => shifted(Key::O),
+            M::Save => command(Key::S),
+            M::SaveSceneAs => shifted(Key::S),
+            M::ExportEpisode => command(Key::E),
+            M::ExportTables => shifted(Key::E),
+            M::ExportPicture => shifted(Key::P),
+            M::CloseEpisode => command(Key::W),
+            M::Quit => command(Key::Q),
+            M::Undo => command(Key::Z),
+            M::Redo => shifted(Key::Z),
+            M::Duplicate => command(Key::D),
+            M::Delete => plain(Key::Delete),
+            M::StepBack => plain(Key::Comma),
+            M::StepForward => plain(Key::Period),
+            M::First => plain(Key::Home),
+            M::Last => plain(Key::End),
+            M::Decide => plain(Key::D),
+            M::DoIt => plain(Key::Enter),
+            M::Run => command(Key::R),
+            M::Cancel => plain(Key::Escape),
+            M::Branch => command(Key::B),
+            M::Layout(layout) => command(
+                [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6]
+                    [LayoutKind::ALL.iter().position(|other| *other == layout).unwrap_or(0)],
+            ),
+            M::ToggleTheme => command(Key::L),
+            M::ZoomIn => command(Key::Plus),
+            M::ZoomOut => command(Key::Minus),
+            M::Shortcuts => plain(Key::F1),
+            M::ResetLayout | M::About => None,
+        }
+    }
+
+    /// Whether it can be done now.
+    pub fn is_available(self, model: &Model) -> bool {
+        let session = model.session();
+        let idle = session.is_some_and(|session| session.activity == Activity::Idle);
+        let open = session.is_some_and(|session| session.read_only.is_none() && !session.is_finished());
+        let authoring = model.kept.layout == LayoutKind::Author;
+        match self {
+            M::Save => authoring || session.is_some_and(|session| session.unsaved),
+            M::SaveSceneAs | M::Undo | M::Redo | M::Duplicate | M::Delete => authoring,
+            M::ExportEpisode | M::ExportTables | M::CloseEpisode => session.is_some(),
+            M::StepBack | M::First => session.is_some() && model.cursor > 0,
+            M::StepForward | M::Last => session.is_some_and(|session| model.cursor < session.steps()),
+            M::Decide | M::DoIt | M::Run => idle && open,
+            M::Cancel => session.is_some_and(|session| session.activity != Activity::Idle),
+            M::Branch => session.is_some(),
+            _ => true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn no_two_entries_share_a_key_or_a_name() {
+        let keys: Vec<_> = M::all().filter_map(M::shortcut).collect();
+        for (at, key) in keys.iter().enumerate() {
+            assert!(!keys[..at].contains(key), "{key:?} is taken twice");
+        }
+        let titles: BTreeSet<&str> = M::all().map(M::title).collect();
+        assert_eq!(titles.len(), M::all().count());
+    }
+
+    #[test]
+    fn without_an_episode_only_what_needs_none_can_be_done() {
+        let model = Model::default();
+        for entry in [M::Decide, M::DoIt, M::Run, M::Cancel, M::Branch, M::ExportEpisode, M::StepBack] {
+            assert!(!entry.is_available(&model), "{entry:?}");
+        }
+        assert!(M::OpenScene.is_available(&model) && M::Quit.is_available(&model));
+    }
+}

@@ -1,0 +1,553 @@
+//! What the three-dimensional views show, as entities of the window's own recording.
+//!
+//! Everything is logged static, so that what is drawn anew replaces what was there: the time cursor is the window's, not
+//! the viewer's. A [`Space`] says what shall be seen; [`Painter::paint`] logs the parts of it that have changed since the
+//! last one, and remembers which voxel every drawn instance is, for picking.
+
+use super::half_belief::HalfBelief;
+use super::model::{ColourBy, Display, GainSource, Hovered, LayoutKind, Picked, Preview};
+use super::session::{Moment, SessionId, Setup};
+use super::{space_layout, viewer};
+use crate::colors::{self, Colormap, Rgb};
+use crate::picture;
+use crate::record::shapes;
+use crate::record::voxels::{colored, surface};
+use nudge_core::belief::{Belief, bernoulli_entropy, beta_mean};
+use nudge_core::camera::ViewId;
+use nudge_core::grid::Grid;
+use nudge_core::plan::{Action, Decision};
+use nudge_core::scene::{BACKGROUND, Body, Catalog, ClassId, Shelf};
+use nudge_core::world::TruthMap;
+use rerun::{AsComponents, RecordingStream};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Entities of the window's recording.
+pub mod at {
+    pub const SHELF: &str = "shelf/panels";
+    pub const EDGES: &str = "shelf/edges";
+    pub const OBJECTS: &str = "objects";
+    pub const BELIEF: &str = "belief";
+    pub const VIEWS: &str = "camera/views";
+    pub const CURRENT: &str = "camera/current";
+    pub const CANDIDATES: &str = "push/candidates";
+    pub const CHOSEN: &str = "push/chosen";
+    pub const SWEPT: &str = "push/swept";
+    pub const PREDICTED: &str = "push/predicted";
+    pub const DIFFERENCE: &str = "push/difference";
+    pub const HAPPENED: &str = "push/happened";
+    pub const GAIN: &str = "gain";
+    pub const OTHER: &str = "other/belief";
+    pub const OTHER_OBJECTS: &str = "other/objects";
+    pub const BETWEEN: &str = "between";
+    pub const HOVERED: &str = "pointer/hovered";
+    pub const PICKED: &str = "pointer/picked";
+}
+
+/// Probability changes smaller than this are not drawn.
+const CHANGED: f32 = 0.05;
+/// Drawn instances of one entity at most, so that the window stays quick.
+const MOST_VOXELS: usize = 200_000;
+
+/// One episode's state.
+#[derive(Clone)]
+pub struct Side {
+    /// The episode.
+    pub id: SessionId,
+    /// Its shelf.
+    pub shelf: Shelf,
+    /// What does not change.
+    pub setup: Setup,
+    /// The state at the cursor.
+    pub moment: Arc<Moment>,
+    /// The state before it.
+    pub before: Option<Arc<Moment>>,
+    /// The state after it.
+    pub after: Option<Arc<Moment>>,
+    /// What was decided at the cursor, or is pending.
+    pub decision: Option<Arc<Decision>>,
+}
+
+impl Side {
+    fn key(&self) -> (SessionId, usize) {
+        (self.id, self.moment.step)
+    }
+}
+
+/// What shall be seen.
+#[derive(Clone)]
+pub struct Space {
+    /// The layout.
+    pub layout: LayoutKind,
+    /// The episode that is shown.
+    pub side: Option<Side>,
+    /// The second one of a comparison.
+    pub other: Option<Side>,
+    /// How the belief is drawn.
+    pub display: Display,
+    /// What the pointer is over.
+    pub hovered: Hovered,
+    /// What is asked about.
+    pub picked: Option<Picked>,
+    /// The chosen view.
+    pub view: Option<ViewId>,
+    /// The chosen push candidate.
+    pub candidate: Option<usize>,
+    /// What a push would do.
+    pub preview: Option<Preview>,
+    /// Where a gain comes from.
+    pub gain: Option<GainSource>,
+}
+
+/// Which voxel every drawn instance of an entity is.
+#[derive(Clone, Default)]
+pub struct Drawn(Arc<Mutex<BTreeMap<&'static str, Arc<Vec<usize>>>>>);
+
+impl Drawn {
+    /// The voxel of an instance.
+    pub fn voxel(&self, entity: &str, instance: usize) -> Option<usize> {
+        let drawn = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        drawn.get(entity)?.get(instance).copied()
+    }
+
+    /// Number of voxels drawn.
+    pub fn count(&self, entity: &str) -> usize {
+        let drawn = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        drawn.get(entity).map_or(0, |voxels| voxels.len())
+    }
+
+    fn set(&self, entity: &'static str, voxels: Vec<usize>) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(entity, Arc::new(voxels));
+    }
+}
+
+/// Logs what has changed.
+pub struct Painter {
+    stream: RecordingStream,
+    drawn: Drawn,
+    /// The views that are there.
+    layout: Option<LayoutKind>,
+    /// What every entity was last drawn from, as words.
+    keys: BTreeMap<&'static str, String>,
+    /// The last beliefs in full precision.
+    beliefs: Vec<((SessionId, usize), Arc<Belief>)>,
+}
+
+impl Painter {
+    /// Draws into a stream; nothing is there yet.
+    pub fn new(stream: RecordingStream, drawn: Drawn) -> Self {
+        Self { stream, drawn, layout: None, keys: BTreeMap::new(), beliefs: Vec::new() }
+    }
+
+    /// Logs what differs from the last call.
+    pub fn paint(&mut self, space: &Space) {
+        if let Some((views, layout)) = space_layout::of(space.layout)
+            && self.layout.replace(views) != Some(views)
+            && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
+        {
+            eprintln!("warning: layout: {error}");
+        }
+        let Some(side) = &space.side else { return self.clear_all() };
+        self.shelf(side);
+        self.objects(side, space);
+        self.belief(side, space);
+        self.cameras(side, space);
+        self.pushes(side, space);
+        if space.layout == LayoutKind::Push {
+            self.push_views(side, space);
+        }
+        if space.layout == LayoutKind::Gains {
+            self.gain(side, space);
+        }
+        if space.layout == LayoutKind::Compare {
+            self.comparison(side, space);
+        }
+        self.pointer(side, space);
+        // What was logged shall be seen at once. This is never the window's own thread.
+        let _ = self.stream.flush_blocking();
+    }
+
+    /// Whether an entity must be drawn anew.
+    fn differs(&mut self, entity: &'static str, key: String) -> bool {
+        let differs = self.keys.get(entity) != Some(&key);
+        if differs {
+            self.keys.insert(entity, key);
+        }
+        differs
+    }
+
+    fn log(&self, entity: &str, content: &impl AsComponents) {
+        if let Err(error) = self.stream.log_static(entity, content) {
+            // A stream in memory has no reason to refuse; the picture is then a step old.
+            eprintln!("warning: {entity}: {error}");
+        }
+    }
+
+    fn log_voxels(&self, entity: &'static str, grid: &Grid, voxels: Vec<usize>, rgb: impl Fn(usize) -> Rgb) {
+        let voxels = thinned(voxels);
+        self.log(entity, &colored(grid, &voxels, rgb));
+        self.drawn.set(entity, voxels);
+    }
+
+    fn clear_all(&mut self) {
+        if self.keys.is_empty() {
+            return;
+        }
+        let grid = Grid::for_shelf([0.1; 3], 0.1);
+        for entity in [at::BELIEF, at::PREDICTED, at::DIFFERENCE, at::HAPPENED, at::GAIN, at::OTHER, at::BETWEEN] {
+            self.log_voxels(entity, &grid, Vec::new(), |_| [0; 3]);
+        }
+        for entity in [at::EDGES, at::VIEWS, at::CURRENT, at::HOVERED, at::PICKED] {
+            self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
+        }
+        for entity in [at::CANDIDATES, at::CHOSEN] {
+            self.log(entity, &no_arrows());
+        }
+        for entity in [at::SHELF, at::OBJECTS, at::OTHER_OBJECTS] {
+            self.log(entity, &nothing());
+        }
+        self.keys.clear();
+    }
+
+    fn full(&mut self, key: (SessionId, usize), belief: &HalfBelief) -> Arc<Belief> {
+        if let Some((_, full)) = self.beliefs.iter().find(|(of, _)| *of == key) {
+            return full.clone();
+        }
+        let full = Arc::new(belief.belief());
+        self.beliefs.push((key, full.clone()));
+        if self.beliefs.len() > 4 {
+            self.beliefs.remove(0);
+        }
+        full
+    }
+
+    fn shelf(&mut self, side: &Side) {
+        if self.differs(at::SHELF, format!("{:?}", side.shelf)) {
+            self.log(at::SHELF, &shapes::shelf_panels(&side.shelf));
+            self.log(at::EDGES, &shapes::shelf_edges(&side.shelf));
+        }
+    }
+
+    fn objects(&mut self, side: &Side, space: &Space) {
+        let shown = space.display.truth.then_some(&side.moment.bodies);
+        if self.differs(at::OBJECTS, format!("{:?}", shown.map(|bodies| (side.id, Arc::as_ptr(bodies))))) {
+            match shown {
+                Some(bodies) => self.log(at::OBJECTS, &glass(bodies, &side.setup.catalog)),
+                None => self.log(at::OBJECTS, &nothing()),
+            }
+        }
+    }
+
+    fn belief(&mut self, side: &Side, space: &Space) {
+        if !self.differs(at::BELIEF, format!("{:?} {:?}", side.key(), voxel_key(&space.display))) {
+            return;
+        }
+        let belief = self.full(side.key(), &side.moment.belief);
+        let before = match (&side.before, space.display.colour_by) {
+            (Some(before), ColourBy::Change) => Some(self.full((side.id, before.step), &before.belief)),
+            _ => None,
+        };
+        let (voxels, rgb) = Voxels { belief: &belief, truth: &side.moment.truth, catalog: &side.setup.catalog }
+            .drawn(&space.display, before.as_deref());
+        self.log_voxels(at::BELIEF, &belief.grid, voxels, rgb);
+    }
+
+    fn cameras(&mut self, side: &Side, space: &Space) {
+        let shown = space.display.views || space.layout == LayoutKind::Gains;
+        let gains = side.decision.as_ref().map(|decision| &decision.gains);
+        if self.differs(at::VIEWS, format!("{shown} {:?} {}", side.key(), gains.is_some())) {
+            let views = &side.setup.views;
+            if !shown {
+                self.log(at::VIEWS, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
+            } else {
+                let range = side.decision.as_ref().map_or([0.0, 1.0], |decision| shapes::gain_range(decision));
+                let colors = views.views.iter().enumerate().map(|(at, _)| match gains.and_then(|gains| gains.get(at)) {
+                    Some(gain) => rerun::Color::from(Colormap::Cividis.of(*gain, range)),
+                    None => rerun::Color::from(shapes::REJECTED_RGB),
+                });
+                self.log(at::VIEWS, &shapes::view_frusta(views).with_colors(colors));
+            }
+        }
+        let looked = match side.moment.outcome.as_ref().map(|outcome| outcome.record.action) {
+            Some(Action::Look { view }) => Some(view),
+            _ => None,
+        };
+        if self.differs(at::CURRENT, format!("{:?} {looked:?}", side.id)) {
+            self.log(at::CURRENT, &frustum(side, looked, 0.10, shapes::CHOSEN_RGB));
+        }
+    }
+
+    fn pushes(&mut self, side: &Side, space: &Space) {
+        let shown = space.display.pushes || space.layout == LayoutKind::Push;
+        let decision = side.decision.as_ref().filter(|decision| shown && !decision.candidates.is_empty());
+        if self.differs(at::CANDIDATES, format!("{:?} {}", side.key(), decision.is_some())) {
+            match decision {
+                Some(decision) => {
+                    self.log(at::CANDIDATES, &shapes::candidates(decision, nudge_core::plan::GAMMA));
+                }
+                None => self.log(at::CANDIDATES, &no_arrows()),
+            }
+        }
+        // The push that led here, or the one that is chosen to be looked at.
+        let done = match side.moment.outcome.as_ref().map(|outcome| outcome.record.action) {
+            Some(Action::Push(push)) => Some(push),
+            _ => None,
+        };
+        let chosen = space
+            .candidate
+            .filter(|_| space.layout == LayoutKind::Push)
+            .and_then(|at| side.decision.as_ref()?.candidates.get(at))
+            .map(|candidate| candidate.push)
+            .or(done);
+        if self.differs(at::CHOSEN, format!("{:?} {chosen:?}", side.id)) {
+            match chosen {
+                Some(push) => self.log(at::CHOSEN, &shapes::chosen_push(&push)),
+                None => self.log(at::CHOSEN, &no_arrows()),
+            }
+        }
+    }
+
+    /// Beside what is believed now: predicted, the difference, and what happened.
+    fn push_views(&mut self, side: &Side, space: &Space) {
+        let preview = space.preview.as_ref().filter(|preview| preview.of == side.key());
+        let now = self.full(side.key(), &side.moment.belief);
+        let grid = now.grid;
+        if self.differs(at::PREDICTED, format!("{:?} {:?}", side.key(), preview.map(|preview| preview.push))) {
+            let swept = preview.map_or_else(Vec::new, |preview| {
+                let mut inside = vec![false; grid.voxel_count()];
+                preview.swept.iter().for_each(|index| inside[index] = true);
+                surface(&grid, &inside)
+            });
+            self.log(at::SWEPT, &colored(&grid, &swept, |_| [120, 200, 255]).with_opacity(0.25));
+            let predicted = preview.map(|preview| {
+                let mut after = (*now).clone();
+                after.apply(&preview.prediction);
+                after
+            });
+            match &predicted {
+                None => {
+                    self.log_voxels(at::PREDICTED, &grid, Vec::new(), |_| [0; 3]);
+                    self.log_voxels(at::DIFFERENCE, &grid, Vec::new(), |_| [0; 3]);
+                }
+                Some(after) => {
+                    let truth = &side.moment.truth;
+                    let plain = Display::default();
+                    let (voxels, rgb) =
+                        Voxels { belief: after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
+                    self.log_voxels(at::PREDICTED, &grid, voxels, rgb);
+                    let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..plain };
+                    let (voxels, rgb) =
+                        Voxels { belief: after, truth, catalog: &side.setup.catalog }.drawn(&changed, Some(&now));
+                    self.log_voxels(at::DIFFERENCE, &grid, voxels, rgb);
+                }
+            }
+        }
+        let after = side.after.as_ref().filter(|after| {
+            after.outcome.as_ref().is_some_and(|outcome| matches!(outcome.record.action, Action::Push(_)))
+        });
+        if self.differs(at::HAPPENED, format!("{:?} {}", side.key(), after.is_some())) {
+            let truth = after.map_or(&side.moment.truth, |after| &after.truth);
+            let inside: Vec<bool> = truth.occupancy.iter().map(|o| *o == 1).collect();
+            let voxels = if after.is_some() { surface(&grid, &inside) } else { Vec::new() };
+            let catalog = &side.setup.catalog;
+            self.log_voxels(at::HAPPENED, &grid, voxels, |index| {
+                colors::of_class(catalog, ClassId(truth.labels[index / grid.dims[2]]))
+            });
+        }
+    }
+
+    fn gain(&mut self, side: &Side, space: &Space) {
+        let source = space.gain.as_ref().filter(|source| source.of == side.key());
+        if !self.differs(at::GAIN, format!("{:?} {:?}", side.key(), source.map(|source| source.view))) {
+            return;
+        }
+        let grid = side.moment.belief.grid();
+        match source {
+            Some(source) => {
+                self.log(at::GAIN, &crate::record::voxels::gains(grid, &source.nats));
+            }
+            None => self.log_voxels(at::GAIN, grid, Vec::new(), |_| [0; 3]),
+        }
+    }
+
+    fn comparison(&mut self, side: &Side, space: &Space) {
+        let Some(other) = &space.other else { return };
+        let key = format!("{:?} {:?}", other.key(), voxel_key(&space.display));
+        let b = self.full(other.key(), &other.moment.belief);
+        if self.differs(at::OTHER, key.clone()) {
+            let (voxels, rgb) = Voxels { belief: &b, truth: &other.moment.truth, catalog: &other.setup.catalog }
+                .drawn(&space.display, None);
+            self.log_voxels(at::OTHER, &b.grid, voxels, rgb);
+            self.log(at::OTHER_OBJECTS, &glass(&other.moment.bodies, &other.setup.catalog));
+        }
+        if self.differs(at::BETWEEN, format!("{:?} {key}", side.key())) {
+            let a = self.full(side.key(), &side.moment.belief);
+            if a.grid != b.grid {
+                return self.log_voxels(at::BETWEEN, &a.grid, Vec::new(), |_| [0; 3]);
+            }
+            let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..space.display.clone() };
+            let (voxels, rgb) = Voxels { belief: &a, truth: &side.moment.truth, catalog: &side.setup.catalog }
+                .drawn(&changed, Some(&b));
+            self.log_voxels(at::BETWEEN, &a.grid, voxels, rgb);
+        }
+    }
+
+    fn pointer(&mut self, side: &Side, space: &Space) {
+        if self.differs(at::HOVERED, format!("{:?} {:?} {:?}", side.id, space.hovered, space.view)) {
+            let strips = match space.hovered {
+                Hovered::View(view) => frustum(side, Some(view), 0.16, [255, 255, 255]),
+                Hovered::Push(push) => {
+                    let (from, to) = (push.start_point(), push.end_point());
+                    rerun::LineStrips3D::new([[<[f32; 3]>::from(from.coords), to.coords.into()]])
+                        .with_colors([rerun::Color::from([255, 255, 255])])
+                        .with_radii([0.006_f32])
+                }
+                Hovered::Nothing => frustum(side, space.view, 0.13, [255, 255, 255]),
+            };
+            self.log(at::HOVERED, &strips);
+        }
+        if self.differs(at::PICKED, format!("{:?} {:?}", side.id, space.picked)) {
+            let grid = side.moment.belief.grid();
+            let strips = match space.picked {
+                None => rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()),
+                Some(Picked::Voxel(index)) => box_edges(grid, index..index + 1),
+                Some(Picked::Cell(cell)) => box_edges(grid, grid.column(cell)),
+            };
+            let strips =
+                strips.with_colors([rerun::Color::from([255, 60, 160])]).with_radii([rerun::Radius::new_ui_points(2.0)]);
+            self.log(at::PICKED, &strips);
+        }
+    }
+}
+
+/// What of the display decides about the belief's voxels.
+fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [f32; 2]) {
+    (display.colour_by, display.band, display.clip_m)
+}
+
+/// Every second, third ... voxel, if there are too many.
+fn thinned(voxels: Vec<usize>) -> Vec<usize> {
+    let step = voxels.len().div_ceil(MOST_VOXELS).max(1);
+    if step == 1 { voxels } else { voxels.into_iter().step_by(step).collect() }
+}
+
+/// A belief with what colours need.
+struct Voxels<'a> {
+    belief: &'a Belief,
+    truth: &'a TruthMap,
+    catalog: &'a Catalog,
+}
+
+impl<'a> Voxels<'a> {
+    /// The voxels to draw and their colours. Without a state before, nothing has changed.
+    fn drawn(
+        &self,
+        display: &Display,
+        before: Option<&'a Belief>,
+    ) -> (Vec<usize>, Box<dyn Fn(usize) -> Rgb + 'a>) {
+        let (belief, truth, catalog) = (self.belief, self.truth, self.catalog);
+        let grid = &belief.grid;
+        let height = grid.dims[2];
+        let [low, high] = display.clip_m.map(|m| m / grid.voxel_m);
+        let [least, most] = display.band;
+        let inside = |index: usize| {
+            let level = (index % height) as f32 + 0.5;
+            level >= low && level <= high
+        };
+        let in_band = |p: f32| p >= least && p <= most && (p > 0.5 || least < 0.5);
+        let changed = |index: usize| before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
+        let voxels: Vec<bool> = belief
+            .occupancy
+            .iter()
+            .enumerate()
+            .map(|(index, a)| {
+                inside(index)
+                    && match display.colour_by {
+                        ColourBy::Change => changed(index).abs() >= CHANGED,
+                        ColourBy::Error => (beta_mean(*a) > 0.5) || truth.occupancy[index] == 1,
+                        _ => in_band(beta_mean(*a)),
+                    }
+            })
+            .collect();
+        let shown = surface(grid, &voxels);
+        let rgb: Box<dyn Fn(usize) -> Rgb + 'a> = match display.colour_by {
+            ColourBy::Probability => Box::new(move |index| Colormap::Viridis.rgb(belief.probability(index))),
+            ColourBy::Entropy => Box::new(move |index| {
+                Colormap::Magma.of(bernoulli_entropy(belief.probability(index)), [0.0, std::f32::consts::LN_2])
+            }),
+            ColourBy::Class => Box::new(move |index| match picture::believed_class(belief, index / height) {
+                None | Some(BACKGROUND) => colors::UNKNOWN_RGB,
+                Some(class) => colors::of_class(catalog, class),
+            }),
+            ColourBy::Error => Box::new(move |index| {
+                match (belief.probability(index) > 0.5, truth.occupancy[index] == 1) {
+                    (true, false) => colors::HALLUCINATED_RGB,
+                    (false, true) => colors::MISSED_RGB,
+                    _ => [226, 228, 232],
+                }
+            }),
+            ColourBy::Change => Box::new(move |index| {
+                let change = before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
+                Colormap::Diverging.of(change, [-1.0, 1.0])
+            }),
+        };
+        (shown, rgb)
+    }
+}
+
+fn glass(bodies: &[Body], catalog: &Catalog) -> rerun::Mesh3D {
+    let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+    for body in bodies {
+        let [r, g, b] = colors::of_class(catalog, body.class);
+        let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, shapes::GLASS_ALPHA);
+        for (position, normal) in shapes::facets(&body.solid.parts) {
+            let position = body.world_from_body * position;
+            let normal = body.world_from_body * normal;
+            positions.push(<[f32; 3]>::from(position.coords));
+            normals.push(<[f32; 3]>::from(normal));
+            colors.push(color);
+        }
+    }
+    if positions.is_empty() {
+        return nothing();
+    }
+    let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
+    rerun::Mesh3D::new(positions)
+        .with_vertex_normals(normals)
+        .with_vertex_colors(colors)
+        .with_triangle_indices(triangles)
+        .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, shapes::GLASS_ALPHA))
+}
+
+/// A mesh that cannot be seen.
+fn nothing() -> rerun::Mesh3D {
+    rerun::Mesh3D::new([[0.0_f32; 3]; 3])
+        .with_vertex_normals([[0.0, 0.0, 1.0]; 3])
+        .with_triangle_indices([[0, 1, 2]])
+        .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(0, 0, 0, 0))
+}
+
+fn no_arrows() -> rerun::Arrows3D {
+    rerun::Arrows3D::from_vectors(Vec::<[f32; 3]>::new())
+}
+
+/// A view's frustum, or nothing.
+fn frustum(side: &Side, view: Option<ViewId>, depth_m: f32, rgb: Rgb) -> rerun::LineStrips3D {
+    let Some(view) = view.and_then(|view| side.setup.views.view(view)) else {
+        return rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new());
+    };
+    shapes::frustum(view, &side.setup.views.intrinsics, depth_m)
+        .with_colors([rerun::Color::from(rgb)])
+        .with_radii([rerun::Radius::new_ui_points(1.6)])
+}
+
+/// The edges of the box around consecutive voxels of a column.
+fn box_edges(grid: &Grid, voxels: std::ops::Range<usize>) -> rerun::LineStrips3D {
+    let half = 0.5 * grid.voxel_m;
+    let low = grid.center(grid.voxel(voxels.start)).coords.add_scalar(-half);
+    let high = grid.center(grid.voxel(voxels.end - 1)).coords.add_scalar(half);
+    let ring = |z: f32| vec![[low.x, low.y, z], [high.x, low.y, z], [high.x, high.y, z], [low.x, high.y, z], [low.x, low.y, z]];
+    let mut strips = vec![ring(low.z), ring(high.z)];
+    strips.extend([[low.x, low.y], [high.x, low.y], [high.x, high.y], [low.x, high.y]].map(|[x, y]| vec![[x, y, low.z], [x, y, high.z]]));
+    rerun::LineStrips3D::new(strips)
+}

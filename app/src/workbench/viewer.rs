@@ -1,0 +1,125 @@
+//! Rerun's viewer inside the window: the only place that touches `re_viewer`.
+//!
+//! It is fed in memory by a [`rerun::RecordingStream`] and opens no port. Its own panels are hidden; what a person
+//! clicks on comes back through [`Viewer::clicked`].
+
+use rerun::external::re_sdk_types::blueprint::components::PanelState;
+use rerun::external::{eframe, egui, re_log_channel, re_log_types, re_viewer, tokio};
+use rerun::{RecordingStream, RecordingStreamBuilder};
+use std::cell::RefCell;
+use std::path::Path;
+use std::rc::Rc;
+
+/// The application id of the window's own recording; layouts of shared recordings go by another.
+pub const APPLICATION: &str = "nudge_workbench";
+
+/// What was clicked on in three dimensions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Clicked {
+    /// The entity's path.
+    pub entity: String,
+    /// Which of its instances.
+    pub instance: Option<usize>,
+}
+
+/// The embedded viewer.
+pub struct Viewer {
+    app: re_viewer::App,
+    clicked: Rc<RefCell<Option<Clicked>>>,
+    /// Dropped last: the viewer's own tasks run on it.
+    _runtime: tokio::runtime::Runtime,
+}
+
+impl Viewer {
+    /// Sets the viewer up in a window that draws with wgpu, and gives back the stream that it shows.
+    ///
+    /// # Errors
+    /// When there is no graphics driver that it can use.
+    pub fn new(cc: &eframe::CreationContext<'_>) -> Result<(Self, RecordingStream), String> {
+        re_viewer::customize_eframe_and_setup_renderer(cc).map_err(|error| error.to_string())?;
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .map_err(|error| error.to_string())?;
+        let clicked = Rc::new(RefCell::new(None));
+        let mut options = re_viewer::StartupOptions::default();
+        options.persist_state = false;
+        options.hide_welcome_screen = true;
+        options.panel_state_overrides.top = Some(PanelState::Hidden);
+        options.panel_state_overrides.blueprint = Some(PanelState::Hidden);
+        options.panel_state_overrides.selection = Some(PanelState::Hidden);
+        options.panel_state_overrides.time = Some(PanelState::Hidden);
+        let heard = clicked.clone();
+        options.on_event = Some(Rc::new(move |event: re_viewer::ViewerEvent| {
+            if let re_viewer::ViewerEventKind::SelectionChange { items } = event.kind {
+                *heard.borrow_mut() = items.iter().find_map(clicked_of);
+            }
+        }));
+        let _entered = runtime.enter();
+        let mut app = re_viewer::App::new(
+            re_viewer::MainThreadToken::i_promise_i_am_on_the_main_thread(),
+            re_viewer::build_info(),
+            re_viewer::AppEnvironment::Custom("Nudge".to_owned()),
+            options,
+            cc,
+            None,
+            re_viewer::AsyncRuntimeHandle::new_native(runtime.handle().clone()),
+        );
+        app.app_options_mut().custom_window_decorations = false;
+        let (sender, receiver) = re_log_channel::log_channel(re_log_channel::LogSource::Sdk);
+        app.add_log_receiver(receiver);
+        let stream = stream_into(sender).map_err(|error| error.to_string())?;
+        drop(_entered);
+        Ok((Self { app, clicked, _runtime: runtime }, stream))
+    }
+
+    /// Takes in what was logged. To be called every frame, before [`Viewer::ui`].
+    pub fn logic(&mut self, ctx: &egui::Context, frame: &mut eframe::Frame) {
+        let _entered = self._runtime.handle().clone();
+        let _entered = _entered.enter();
+        eframe::App::logic(&mut self.app, ctx, frame);
+    }
+
+    /// Draws it into what is left of the window.
+    pub fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        let _entered = self._runtime.handle().clone();
+        let _entered = _entered.enter();
+        eframe::App::ui(&mut self.app, ui, frame);
+    }
+
+    /// What was clicked on since the last call.
+    pub fn clicked(&mut self) -> Option<Clicked> {
+        self.clicked.borrow_mut().take()
+    }
+
+    /// Shows a recording in place of the window's own.
+    pub fn open_recording(&mut self, path: &Path) {
+        self.app.open_url_or_file(&path.to_string_lossy());
+    }
+}
+
+fn clicked_of(item: &re_viewer::SelectionChangeItem) -> Option<Clicked> {
+    match item {
+        re_viewer::SelectionChangeItem::Entity { entity_path, instance_id, .. } => Some(Clicked {
+            entity: entity_path.to_string().trim_start_matches('/').to_owned(),
+            instance: instance_id.specific_index().map(|index| index.get() as usize),
+        }),
+        _ => None,
+    }
+}
+
+/// A stream whose messages go straight into the viewer. Its sender may block, so nothing may be flushed on the window's
+/// own thread, which is the one that takes messages out.
+fn stream_into(sender: re_log_channel::LogSender) -> rerun::RecordingStreamResult<RecordingStream> {
+    let (stream, _) = RecordingStreamBuilder::new(APPLICATION).send_properties(false).memory()?;
+    stream.set_log_time_enabled(false);
+    stream.set_log_tick_enabled(false);
+    stream.set_sink(Box::new(rerun::sink::CallbackSink::new(move |messages: &[re_log_types::LogMsg]| {
+        for message in messages {
+            // The viewer is gone once the window is closed.
+            let _ = sender.send(message.clone().into());
+        }
+    })));
+    Ok(stream)
+}

@@ -7,21 +7,31 @@ use std::io::Write;
 use std::process::ExitCode;
 
 mod mesh;
+#[cfg(feature = "workbench")]
+mod open;
 mod replay;
 mod run;
 mod scene;
+#[cfg(feature = "workbench")]
+mod shot;
 mod views;
 
 /// Manipulation-enhanced mapping of cluttered shelves: look, push, and know how sure you are.
 #[derive(Parser)]
-#[command(name = "nudge", version, about, arg_required_else_help = true)]
+#[command(name = "nudge", version, about, arg_required_else_help = !cfg!(feature = "workbench"))]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Subcommand)]
 enum Command {
+    /// Open the workbench, with a scene, an episode or a recording (the same as no command)
+    #[cfg(feature = "workbench")]
+    Open(open::Args),
+    /// Render the workbench's window to a picture, without a display
+    #[cfg(feature = "workbench")]
+    Shot(shot::Args),
     /// Map a scene with a policy and write the episode
     Run(run::Args),
     /// Re-run an episode from its log and verify every step
@@ -38,11 +48,20 @@ enum Command {
 /// failed check, 2 for wrong use or bad input.
 pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
-        Command::Run(args) => run::run(&args),
-        Command::Replay(args) => replay::run(&args),
-        Command::Scene(args) => scene::run(&args),
-        Command::Mesh(args) => mesh::run(&args),
-        Command::Views(args) => views::run(&args),
+        #[cfg(feature = "workbench")]
+        None => open::run(&open::Args::default()),
+        #[cfg(feature = "workbench")]
+        Some(Command::Open(args)) => open::run(&args),
+        #[cfg(feature = "workbench")]
+        Some(Command::Shot(args)) => shot::run(&args),
+        // Clap has shown the help already.
+        #[cfg(not(feature = "workbench"))]
+        None => Ok(()),
+        Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Scene(args)) => scene::run(&args),
+        Some(Command::Mesh(args)) => mesh::run(&args),
+        Some(Command::Views(args)) => views::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

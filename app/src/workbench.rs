@@ -6,11 +6,44 @@
 //! viewer. `shot` renders the same window without a display.
 
 pub mod annotations;
+pub mod app;
 pub mod author;
+pub mod browser;
 pub mod command;
 pub mod derive;
+pub mod dialog;
+pub mod export;
 pub mod half_belief;
+pub mod jobs;
+pub mod latest;
+pub mod menu;
 pub mod model;
 pub mod panels;
 pub mod session;
+pub mod shot;
+pub mod space;
+pub mod space_layout;
 pub mod toasts;
+pub mod viewer;
+pub mod worker;
+
+#[cfg(test)]
+mod fixture;
+
+use rerun::external::eframe;
+use rerun::external::egui;
+
+/// Opens the window and returns when it is closed.
+///
+/// # Errors
+/// When there is no display.
+pub fn run(options: app::Options) -> Result<(), String> {
+    let mut native = rerun::external::re_viewer::native::eframe_options(None);
+    native.viewport = egui::ViewportBuilder::default()
+        .with_app_id("nudge")
+        .with_title("Nudge")
+        .with_inner_size([1440.0, 900.0])
+        .with_min_inner_size([900.0, 560.0]);
+    eframe::run_native("Nudge", native, Box::new(move |cc| Ok(Box::new(app::App::new(cc, options.clone())))))
+        .map_err(|error| error.to_string())
+}

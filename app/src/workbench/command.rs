@@ -49,6 +49,8 @@ pub enum Command {
     Note(usize, String),
     /// Overrules the scorer's verdict on an object at a step, or takes that back.
     Overrule(usize, String, Option<Verdict>),
+    /// Goes back from a foreign recording to the episode.
+    CloseRecording,
     /// Starts an episode of the scene that is being authored.
     TryScene,
     /// Tells of something, as a toast.

@@ -10,7 +10,7 @@ use nudge_core::camera::ViewId;
 use nudge_core::plan::{PlannerSettings, PolicyKind};
 use nudge_core::tool::Push;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -231,6 +231,10 @@ pub struct Model {
     pub gain_source: Option<GainSource>,
     /// Floor maps and full-precision beliefs of the states that are shown, made in the background.
     pub derived: BTreeMap<(SessionId, usize), Arc<Derived>>,
+    /// A foreign recording that is shown in place of the episode.
+    pub recording: Option<PathBuf>,
+    /// States whose maps are being made.
+    pub deriving: BTreeSet<(SessionId, usize)>,
     /// The height of the slice that maps show, metres; `None` for the whole column.
     pub slice_m: Option<f32>,
     /// The scene in the making.
@@ -248,6 +252,30 @@ impl Model {
     /// An open episode, to be changed.
     pub fn session_of_mut(&mut self, id: SessionId) -> Option<&mut Session> {
         self.sessions.iter_mut().find(|session| session.id == id)
+    }
+
+    /// Shows an open episode at its last state. What was chosen in another one is let go.
+    pub fn show(&mut self, id: SessionId) {
+        if self.shown != Some(id) {
+            (self.picked, self.view, self.candidate) = (None, None, None);
+            self.hovered = Hovered::Nothing;
+        }
+        self.shown = Some(id);
+        self.cursor = self.session().map_or(0, Session::steps);
+    }
+
+    /// Lets an open episode go, with all that was made of it.
+    pub fn forget(&mut self, id: SessionId) {
+        self.sessions.retain(|session| session.id != id);
+        self.derived.retain(|(of, _), _| *of != id);
+        self.deriving.retain(|(of, _)| *of != id);
+        self.other = self.other.filter(|other| *other != id);
+        if self.shown == Some(id) {
+            self.shown = None;
+            if let Some(last) = self.sessions.last().map(|session| session.id) {
+                self.show(last);
+            }
+        }
     }
 
     /// The episode that is shown.

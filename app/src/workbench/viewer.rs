@@ -97,6 +97,13 @@ impl Viewer {
     pub fn open_recording(&mut self, path: &Path) {
         self.app.open_url_or_file(&path.to_string_lossy());
     }
+
+    /// Goes back to the window's own recording: closes every other one.
+    pub fn close_recording(&mut self) {
+        use rerun::external::re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
+        let own = re_log_types::ApplicationId::from(APPLICATION);
+        self.app.command_sender.send_system(SystemCommand::ActivateApp(own));
+    }
 }
 
 fn clicked_of(item: &re_viewer::SelectionChangeItem) -> Option<Clicked> {

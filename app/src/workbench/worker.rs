@@ -32,7 +32,12 @@ pub enum Begin {
         out: PathBuf,
     },
     /// An episode that is in a directory.
-    Open(PathBuf),
+    Open {
+        /// The directory.
+        path: PathBuf,
+        /// Whether to leave everything in it as it is.
+        look_only: bool,
+    },
     /// A new episode that repeats the first steps of another.
     Branch {
         /// The other's scene, configuration and steps.
@@ -256,11 +261,16 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool
             let opened = opened(&out, driver.episode(), moments, None)?;
             Ok((Track::Writing(Box::new(driver)), opened))
         }
-        Begin::Open(path) => {
+        Begin::Open { path, look_only } => {
             let record = EpisodeDir::open(&path)?.record()?;
             let update = update_named(&record.config.belief, &record.config)?;
             let of = record.steps.len();
             let mut moments = Vec::with_capacity(of + 1);
+            if look_only {
+                let episode = review(&path, catalog, update, &mut watch(post, cancelled, of, &mut moments))?;
+                let reason = Some("nothing in its directory shall change".to_owned());
+                return Ok((Track::Reading, opened(&path, &episode, moments, reason)?));
+            }
             match Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, cancelled, of, &mut moments)) {
                 Ok(driver) => {
                     let opened = opened(&path, driver.episode(), moments, None)?;

@@ -1,0 +1,68 @@
+//! `nudge shot`: the workbench's window as a picture, without a display.
+
+use crate::workbench::model::LayoutKind;
+use crate::workbench::shot::{Shot, shoot};
+use std::path::PathBuf;
+
+/// What was typed.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// A scene (.toml) or an episode's directory
+    open: PathBuf,
+    /// A second episode, for the layout compare
+    #[arg(long, value_name = "EPISODE")]
+    with: Option<PathBuf>,
+    /// Number of actions after which to show it (default: the last state)
+    #[arg(long)]
+    step: Option<usize>,
+    /// episode, why, gains, push, compare or author
+    #[arg(long, default_value = "episode", value_parser = layout)]
+    layout: LayoutKind,
+    /// Width and height of the window, points
+    #[arg(long, default_value = "1440x900", value_parser = size)]
+    size: [u32; 2],
+    /// Pixels per point; 2 for a figure in print
+    #[arg(long, default_value_t = 1.0)]
+    scale: f32,
+    /// The light theme
+    #[arg(long)]
+    light: bool,
+    /// The picture
+    #[arg(long)]
+    out: PathBuf,
+}
+
+fn layout(name: &str) -> Result<LayoutKind, String> {
+    let known = || LayoutKind::ALL.map(|layout| layout.title().to_lowercase()).join(", ");
+    LayoutKind::ALL
+        .into_iter()
+        .find(|layout| layout.title().eq_ignore_ascii_case(name))
+        .ok_or_else(|| format!("there are {}", known()))
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once('x').ok_or("width and height, like 1440x900")?;
+    let number = |text: &str| text.parse::<u32>().ok().filter(|n| (200..=8192).contains(n));
+    match (number(width), number(height)) {
+        (Some(width), Some(height)) => Ok([width, height]),
+        _ => Err("two numbers from 200 to 8192, like 1440x900".to_owned()),
+    }
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    anyhow::ensure!(args.open.exists(), "{}: no such file or directory", args.open.display());
+    anyhow::ensure!((0.5..=4.0).contains(&args.scale), "--scale {}: must be between 0.5 and 4", args.scale);
+    let out = tempfile::tempdir()?;
+    let shot = Shot {
+        open: args.open.clone(),
+        with: args.with.clone(),
+        step: args.step,
+        layout: args.layout,
+        size: args.size,
+        scale: args.scale,
+        light: args.light,
+    };
+    let picture = shoot(&shot, out.path().to_owned())?;
+    Ok(crate::picture::save(&picture, &args.out)?)
+}

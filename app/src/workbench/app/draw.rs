@@ -1,0 +1,249 @@
+//! The window's frame: menus and tabs on top, the episode at the left, the clock at the bottom, and the layout's panels
+//! around the three-dimensional views.
+
+use super::App;
+use crate::workbench::command::{Command, Level, MenuCommand};
+use crate::workbench::menu::MENUS;
+use crate::workbench::model::LayoutKind;
+use crate::workbench::panels;
+use rerun::external::{eframe, egui};
+use std::time::Instant;
+
+/// Frames whose time is kept.
+const FRAMES: usize = 240;
+
+impl App {
+    /// Draws the window; without a frame of eframe's the viewer is left out.
+    pub fn draw(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
+        let started = Instant::now();
+        let ctx = ui.ctx().clone();
+        self.before(&ctx);
+        let mut ask = Vec::new();
+        egui::Panel::top("menus").show(ui, |ui| self.menus(ui, &mut ask));
+        egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
+        let openings: Vec<_> =
+            self.openings.values().map(|opening| (opening.title.clone(), opening.activity)).collect();
+        if self.model.kept.layout == LayoutKind::Author {
+            egui::CentralPanel::default().show(ui, |ui| panels::author::show(ui, &mut self.model, &mut ask));
+        } else if self.model.sessions.is_empty() {
+            egui::CentralPanel::default().show(ui, |ui| {
+                panels::episode::openings(ui, &openings, &mut ask);
+                panels::scenes::show(ui, &mut self.model, &mut ask);
+            });
+        } else {
+            egui::Panel::left("episode").default_size(236.0).size_range(200.0..=380.0).show(ui, |ui| {
+                scrolled(ui, "episode", |ui| {
+                    panels::episode::openings(ui, &openings, &mut ask);
+                    panels::episode::show(ui, &mut self.model, &mut ask);
+                });
+            });
+            self.layout(ui, frame, &mut ask);
+        }
+        self.over(&ctx, &mut ask);
+        for command in ask {
+            self.carry_out(command);
+        }
+        let viewer_ms = std::mem::take(&mut self.viewer_ms);
+        if let Some(last) = self.frame_ms.last_mut() {
+            *last += started.elapsed().as_secs_f32() * 1e3 - viewer_ms;
+        }
+        if self.frame_ms.len() > FRAMES {
+            self.frame_ms.remove(0);
+        }
+    }
+
+    /// What only a frame can do: theme, zoom, pictures, the end.
+    fn before(&mut self, ctx: &egui::Context) {
+        if self.theme_set != Some(self.model.kept.light) {
+            self.theme_set = Some(self.model.kept.light);
+            ctx.set_theme(if self.model.kept.light { egui::Theme::Light } else { egui::Theme::Dark });
+        }
+        if let Some(factor) = self.zoom_asked.take() {
+            ctx.set_zoom_factor((ctx.zoom_factor() * factor).clamp(0.5, 3.0));
+        }
+        if std::mem::take(&mut self.reset_asked) {
+            ctx.memory_mut(|memory| memory.reset_areas());
+            ctx.data_mut(|data| data.clear());
+        }
+        if std::mem::take(&mut self.picture_asked) {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::UserData::default()));
+        }
+        if std::mem::take(&mut self.quit_asked) {
+            ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    }
+
+    fn menus(&mut self, ui: &mut egui::Ui, ask: &mut Vec<Command>) {
+        egui::MenuBar::new().ui(ui, |ui| {
+            for (name, entries) in MENUS {
+                ui.menu_button(name, |ui| {
+                    for entry in entries {
+                        match entry {
+                            None => {
+                                ui.separator();
+                            }
+                            Some(entry) => {
+                                if self.entry(ui, *entry).clicked() {
+                                    ask.push(Command::Menu(*entry));
+                                    ui.close();
+                                }
+                            }
+                        }
+                    }
+                    if name == "File" {
+                        self.recent(ui, ask);
+                    }
+                });
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                for layout in LayoutKind::ALL.into_iter().rev() {
+                    let entry = MenuCommand::Layout(layout);
+                    let tab = ui.selectable_label(self.model.kept.layout == layout, layout.title());
+                    if tab.on_hover_text(tooltip(ui.ctx(), entry)).clicked() {
+                        ask.push(Command::Layout(layout));
+                    }
+                }
+            });
+        });
+    }
+
+    fn entry(&self, ui: &mut egui::Ui, entry: MenuCommand) -> egui::Response {
+        let mut button = egui::Button::new(entry.title());
+        if let Some(keys) = entry.shortcut() {
+            button = button.shortcut_text(ui.ctx().format_shortcut(&keys));
+        }
+        ui.add_enabled(entry.is_available(&self.model), button).on_hover_text(entry.tooltip())
+    }
+
+    fn recent(&self, ui: &mut egui::Ui, ask: &mut Vec<Command>) {
+        if self.model.kept.recent.is_empty() {
+            return;
+        }
+        ui.separator();
+        ui.menu_button("Open recent", |ui| {
+            for path in &self.model.kept.recent {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                if ui.button(name).on_hover_text(path.display().to_string()).clicked() {
+                    ask.push(Command::Open(path.clone()));
+                    ui.close();
+                }
+            }
+        });
+    }
+
+    fn layout(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>, ask: &mut Vec<Command>) {
+        let layout = self.model.kept.layout;
+        let right = match layout {
+            LayoutKind::Why | LayoutKind::Gains | LayoutKind::Push | LayoutKind::Compare => 420.0,
+            _ => 300.0,
+        };
+        egui::Panel::right(egui::Id::new(("right", layout))).default_size(right).size_range(240.0..=700.0).show(
+            ui,
+            |ui| {
+                scrolled(ui, "right", |ui| match layout {
+                    LayoutKind::Why => panels::why::show(ui, &mut self.model, ask),
+                    LayoutKind::Gains => panels::gains::show(ui, &mut self.model, ask),
+                    LayoutKind::Push => panels::push::show(ui, &mut self.model, ask),
+                    LayoutKind::Compare => panels::compare::show(ui, &mut self.model, ask),
+                    LayoutKind::Episode | LayoutKind::Author => {
+                        panels::decision::show(ui, &mut self.model, ask);
+                        ui.add_space(8.0);
+                        ui.separator();
+                        panels::notes::show(ui, &mut self.model, ask);
+                    }
+                });
+            },
+        );
+        if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
+            egui::Panel::bottom("curves").resizable(true).default_size(170.0).size_range(110.0..=420.0).show(ui, |ui| {
+                panels::curves::show(ui, &mut self.model, ask);
+            });
+        }
+        if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {
+            egui::Panel::right("maps").default_size(390.0).size_range(220.0..=800.0).show(ui, |ui| {
+                scrolled(ui, "maps", |ui| {
+                    panels::maps::show(ui, &mut self.model, ask);
+                    ui.add_space(6.0);
+                    panels::camera::show(ui, &mut self.model, ask);
+                });
+            });
+        }
+        egui::Panel::bottom("display").show(ui, |ui| {
+            panels::display::show(ui, &mut self.model, self.drawn.count(crate::workbench::space::at::BELIEF), ask);
+        });
+        self.space_view(ui, frame);
+    }
+
+    /// The three-dimensional views, or why there are none.
+    fn space_view(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
+        let started = Instant::now();
+        match (&mut self.viewer, frame) {
+            (Some(viewer), Some(frame)) => viewer.ui(ui, frame),
+            _ => {
+                egui::CentralPanel::default().show(ui, |ui| {
+                    ui.centered_and_justified(|ui| {
+                        let reason = self.no_viewer.as_deref().unwrap_or("no window");
+                        ui.weak(format!("No three-dimensional views: {reason}"));
+                    });
+                });
+            }
+        }
+        self.viewer_ms = started.elapsed().as_secs_f32() * 1e3;
+    }
+
+    /// What lies over everything: dropped files, dialogs, toasts.
+    fn over(&mut self, ctx: &egui::Context, ask: &mut Vec<Command>) {
+        let hovering = ctx.input(|input| !input.raw.hovered_files.is_empty());
+        if hovering {
+            let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::new("drop")));
+            let screen = ctx.content_rect();
+            painter.rect_filled(screen, 0.0, egui::Color32::from_black_alpha(160));
+            painter.text(
+                screen.center(),
+                egui::Align2::CENTER_CENTER,
+                "Drop a scene, an episode or a recording",
+                egui::FontId::proportional(22.0),
+                egui::Color32::WHITE,
+            );
+        }
+        if let Some(dialog) = &mut self.dialog
+            && let Some(reply) = panels::windows::show(ctx, dialog)
+        {
+            self.reply(reply);
+        }
+        panels::windows::toasts(ctx, &mut self.model.toasts, ask);
+        if self.model.recording.is_some() {
+            egui::Area::new(egui::Id::new("recording")).anchor(egui::Align2::CENTER_TOP, [0.0, 34.0]).show(ctx, |ui| {
+                egui::Frame::popup(ui.style()).show(ui, |ui| {
+                    ui.horizontal(|ui| {
+                        let name = self.model.recording.as_ref().map(|path| path.display().to_string());
+                        ui.label(format!("Recording {}", name.unwrap_or_default()));
+                        if ui.button("Back to the episode").clicked() {
+                            ask.push(Command::CloseRecording);
+                        }
+                    });
+                });
+            });
+        }
+    }
+
+    /// Adds a message.
+    pub fn say(&mut self, level: Level, text: &str) {
+        self.model.toasts.tell(level, text);
+    }
+}
+
+/// A tooltip with the entry's keys.
+fn tooltip(ctx: &egui::Context, entry: MenuCommand) -> String {
+    match entry.shortcut() {
+        Some(keys) => format!("{} ({})", entry.tooltip(), ctx.format_shortcut(&keys)),
+        None => entry.tooltip().to_owned(),
+    }
+}
+
+fn scrolled(ui: &mut egui::Ui, id: &str, content: impl FnOnce(&mut egui::Ui)) {
+    egui::ScrollArea::vertical().id_salt(id).auto_shrink(false).show(ui, |ui| {
+        ui.add_space(4.0);
+        content(ui);
+    });
+}

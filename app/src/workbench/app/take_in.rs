@@ -1,0 +1,335 @@
+//! What comes in every frame: events of workers, answers of jobs, clicks in the viewer, keys, dropped files.
+
+use super::{Answer, App, ChosenFor};
+use crate::workbench::command::{Command, Level, MenuCommand};
+use crate::workbench::derive::Derived;
+use crate::workbench::jobs::JobKind;
+use crate::workbench::model::{LayoutKind, Picked};
+use crate::workbench::session::{Activity, Session, SessionId};
+use crate::workbench::space::{Side, Space};
+use crate::workbench::viewer::Clicked;
+use crate::workbench::worker::{Event, Opened};
+use crate::workbench::annotations::Annotations;
+use rerun::external::egui;
+use std::sync::{Arc, PoisonError};
+
+/// How many states keep their maps and full beliefs.
+const DERIVED_KEPT: usize = 6;
+
+impl App {
+    pub(super) fn take_in(&mut self, ctx: &egui::Context) {
+        while let Ok((id, event)) = self.events.1.try_recv() {
+            self.hear(id, event);
+        }
+        while let Ok(answer) = self.answers.1.try_recv() {
+            self.receive(answer);
+        }
+        if let Some(clicked) = self.viewer.as_mut().and_then(|viewer| viewer.clicked()) {
+            self.click(&clicked);
+        }
+        self.keys(ctx);
+        self.dropped(ctx);
+        self.picture(ctx);
+        self.derive();
+        self.space();
+        self.quitting(ctx);
+        self.script();
+    }
+
+    fn hear(&mut self, id: SessionId, event: Event) {
+        match event {
+            Event::Opened(opened) => self.opened(id, *opened),
+            Event::Activity(activity) => {
+                if let Some(opening) = self.openings.get_mut(&id) {
+                    opening.activity = activity;
+                } else if let Some(session) = self.model.session_of_mut(id) {
+                    session.activity = activity;
+                }
+            }
+            Event::Decided(decision) => {
+                if let Some(session) = self.model.session_of_mut(id) {
+                    session.pending = Some(decision);
+                }
+            }
+            Event::Stepped(moment) => {
+                let (shown, cursor) = (self.model.shown, self.model.cursor);
+                let Some(session) = self.model.session_of_mut(id) else { return };
+                let followed = shown == Some(id) && cursor >= session.steps();
+                if let Some(outcome) = &moment.outcome {
+                    session.record.steps.push(outcome.record.clone());
+                }
+                session.moments.push(moment);
+                session.pending = None;
+                if followed {
+                    self.model.cursor = cursor + 1;
+                }
+            }
+            Event::Failed(words) => {
+                self.openings.remove(&id);
+                if self.model.session_of(id).is_none() {
+                    self.workers.remove(&id);
+                }
+                if words != "cancelled" {
+                    self.model.toasts.tell(Level::Error, words);
+                }
+            }
+            Event::Panicked(words) => {
+                self.openings.remove(&id);
+                self.workers.remove(&id);
+                if let Some(session) = self.model.session_of_mut(id) {
+                    session.activity = Activity::Idle;
+                    session.read_only = Some("its worker broke down".to_owned());
+                    let path = session.path.display().to_string();
+                    let steps = session.steps();
+                    let message = format!(
+                        "The episode's worker broke down: {words}. All {steps} steps are saved in {path}; export it, or \
+                         close and open it to go on."
+                    );
+                    self.model.toasts.tell(Level::Error, message);
+                } else {
+                    self.model.toasts.tell(Level::Error, format!("The episode could not be opened: {words}"));
+                }
+            }
+        }
+    }
+
+    fn opened(&mut self, id: SessionId, opened: Opened) {
+        self.openings.remove(&id);
+        let annotations = match Annotations::read(&opened.path) {
+            Ok(annotations) => annotations,
+            Err(error) => {
+                self.model.toasts.tell(Level::Warning, format!("{error}; its notes are left out"));
+                Annotations::default()
+            }
+        };
+        if let Some(reason) = opened.read_only.as_ref().filter(|_| !self.options.look_only) {
+            self.model.toasts.tell(Level::Warning, format!("Opened to look at only: {reason}"));
+        }
+        let steps = opened.moments.len() - 1;
+        self.model.sessions.push(Session {
+            id,
+            path: opened.path,
+            record: opened.record,
+            setup: opened.setup,
+            moments: opened.moments,
+            pending: None,
+            activity: Activity::Opening { done: steps, of: steps },
+            read_only: opened.read_only,
+            annotations,
+            unsaved: false,
+        });
+        if self.model.kept.layout == LayoutKind::Author {
+            self.model.kept.layout = LayoutKind::Episode;
+        }
+        self.model.show(id);
+        self.model.cursor = steps;
+    }
+
+    fn receive(&mut self, answer: Answer) {
+        match answer {
+            Answer::Maps(derived) => {
+                self.model.derived.insert(derived.of, Arc::new(derived));
+            }
+            Answer::Preview(preview) => self.model.preview = Some(preview),
+            Answer::Gain(source) => self.model.gain_source = Some(source),
+            Answer::Tell(level, text) => self.model.toasts.tell(level, text),
+            Answer::Chosen(ChosenFor::Opening, path) => self.carry_out(Command::Open(path)),
+            Answer::Chosen(ChosenFor::Dialog, path) => {
+                if let Some(dialog) = &mut self.dialog {
+                    dialog.chosen(&path);
+                }
+            }
+        }
+    }
+
+    /// A click in three dimensions asks about the voxel.
+    fn click(&mut self, clicked: &Clicked) {
+        let voxel = clicked.instance.and_then(|instance| self.drawn.voxel(&clicked.entity, instance));
+        if let Some(voxel) = voxel {
+            self.carry_out(Command::Pick(Some(Picked::Voxel(voxel))));
+        } else if clicked.entity == crate::workbench::space::at::VIEWS
+            && let Some(view) = clicked.instance
+        {
+            self.carry_out(Command::GainOf(nudge_core::camera::ViewId(view as u16)));
+        } else if clicked.entity == crate::workbench::space::at::CANDIDATES {
+            self.model.candidate = clicked.instance;
+        }
+    }
+
+    /// Shortcuts are taken before the viewer sees them; a text field keeps its keys.
+    fn keys(&mut self, ctx: &egui::Context) {
+        let typing = ctx.egui_wants_keyboard_input();
+        let authoring = self.model.kept.layout == LayoutKind::Author;
+        for entry in MenuCommand::all() {
+            let Some(keys) = entry.shortcut() else { continue };
+            let plain = keys.modifiers.is_none();
+            // Undo and the keys without a modifier belong to whatever is typed in, and the editor has its own.
+            let edits = matches!(
+                entry,
+                MenuCommand::Undo | MenuCommand::Redo | MenuCommand::Duplicate | MenuCommand::Delete
+            );
+            if (plain && (typing || self.dialog.is_some())) || (edits && (typing || authoring)) {
+                continue;
+            }
+            if plain && entry != MenuCommand::Cancel && authoring {
+                continue;
+            }
+            if ctx.input_mut(|input| input.consume_shortcut(&keys)) && entry.is_available(&self.model) {
+                self.carry_out(Command::Menu(entry));
+            }
+        }
+    }
+
+    fn dropped(&mut self, ctx: &egui::Context) {
+        let files = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
+        for path in files.into_iter().filter_map(|file| file.path) {
+            self.carry_out(Command::Open(path));
+        }
+    }
+
+    /// Writes the picture of the window that was asked for, once it is there.
+    fn picture(&mut self, ctx: &egui::Context) {
+        let taken = ctx.input(|input| {
+            input.events.iter().find_map(|event| match event {
+                egui::Event::Screenshot { image, .. } => Some(image.clone()),
+                _ => None,
+            })
+        });
+        let (Some(image), Some(path)) = (taken, self.picture_to.take()) else { return };
+        self.errand(move |answers| {
+            let rgb = image.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect();
+            let picture = image::RgbImage::from_raw(image.width() as u32, image.height() as u32, rgb);
+            let written = picture.ok_or_else(|| "the picture is empty".to_owned()).and_then(|picture| {
+                crate::picture::save(&picture, &path).map_err(|error| error.to_string())
+            });
+            let _ = answers.send(match written {
+                Ok(()) => Answer::Tell(Level::Info, format!("Wrote {}", path.display())),
+                Err(words) => Answer::Tell(Level::Error, words),
+            });
+        });
+    }
+
+    /// Asks for the maps of the states that are shown.
+    fn derive(&mut self) {
+        let shown = self.model.session().map(|session| (session.id, JobKind::Maps));
+        let other = self
+            .model
+            .other_session()
+            .filter(|_| self.model.kept.layout == LayoutKind::Compare)
+            .map(|session| (session.id, JobKind::OtherMaps));
+        for (id, kind) in shown.into_iter().chain(other) {
+            let Some(session) = self.model.session_of(id) else { continue };
+            let moment = session.moment(self.model.cursor).clone();
+            let key = (id, moment.step);
+            if self.model.derived.contains_key(&key) || !self.model.deriving.insert(key) {
+                continue;
+            }
+            let (catalog, answers, wake) =
+                (session.setup.catalog.clone(), self.answers.0.clone(), self.wake.clone());
+            self.jobs.add(kind, move || {
+                let _ = answers.send(Answer::Maps(Derived::of(id, &moment, &catalog)));
+                wake();
+            });
+        }
+        // A request that was replaced while it waited must be made again when its state is shown again.
+        let wanted: Vec<_> = [self.model.shown, self.model.other]
+            .into_iter()
+            .flatten()
+            .filter_map(|id| Some((id, self.model.session_of(id)?.moment(self.model.cursor).step)))
+            .collect();
+        self.model.deriving.retain(|key| wanted.contains(key));
+        while self.model.derived.len() > DERIVED_KEPT {
+            let Some(far) = self.model.derived.keys().find(|key| !wanted.contains(key)).copied() else { break };
+            self.model.derived.remove(&far);
+        }
+    }
+
+    /// Asks for the three-dimensional views, if something about them has changed.
+    fn space(&mut self) {
+        let Some(painter) = &self.painter else { return };
+        let model = &self.model;
+        let side = |session: &Session| {
+            let moment = session.moment(model.cursor).clone();
+            let step = moment.step;
+            Side {
+                id: session.id,
+                shelf: session.record.scene.shelf,
+                setup: session.setup.clone(),
+                before: step.checked_sub(1).map(|before| session.moment(before).clone()),
+                after: session.moments.get(step + 1).cloned(),
+                decision: session.decision_after(step).cloned().map(Arc::new),
+                moment,
+            }
+        };
+        let kept = &model.kept;
+        let key = format!(
+            "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            kept.layout,
+            model.session().map(|session| (session.id, session.steps(), session.pending.is_some())),
+            model.other_session().map(|session| (session.id, session.steps())),
+            model.cursor,
+            kept.display,
+            model.hovered,
+            model.picked,
+            model.view,
+            model.candidate,
+            model.preview.as_ref().map(|preview| (preview.of, preview.push)),
+            model.gain_source.as_ref().map(|source| (source.of, source.view)),
+        );
+        if key == self.asked_space {
+            return;
+        }
+        self.asked_space = key;
+        let space = Space {
+            layout: kept.layout,
+            side: model.session().map(side),
+            other: model.other_session().filter(|_| kept.layout == LayoutKind::Compare).map(side),
+            display: kept.display.clone(),
+            hovered: model.hovered,
+            picked: model.picked,
+            view: model.view,
+            candidate: model.candidate,
+            preview: model.preview.clone(),
+            gain: model.gain_source.clone(),
+        };
+        let (painter, wake) = (painter.clone(), self.wake.clone());
+        self.jobs.add(JobKind::Space, move || {
+            painter.lock().unwrap_or_else(PoisonError::into_inner).paint(&space);
+            wake();
+        });
+    }
+
+    /// Goes on with what shall be done without a person.
+    fn script(&mut self) {
+        let Some(script) = self.options.script.clone() else { return };
+        (self.wake)();
+        if self.is_busy() {
+            return;
+        }
+        let done = self.model.session().map_or(0, Session::steps);
+        if self.model.sessions.is_empty() {
+            // Nothing was opened; the toast that says why is on the picture.
+        } else if done < script.steps && self.model.session().is_some_and(|session| !session.is_finished()) {
+            return self.carry_out(Command::DoIt);
+        }
+        self.script_frames += 1;
+        match self.script_frames {
+            40 => (self.picture_to, self.picture_asked) = (Some(script.picture), true),
+            41.. if self.picture_to.is_none() && self.jobs.is_idle() => {
+                (self.may_quit, self.quit_asked) = (true, true);
+            }
+            _ => {}
+        }
+    }
+
+    fn quitting(&mut self, ctx: &egui::Context) {
+        if !ctx.input(|input| input.viewport().close_requested()) || self.may_quit {
+            return;
+        }
+        let lost = self.unsaved();
+        if !lost.is_empty() {
+            ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+            self.dialog = Some(crate::workbench::dialog::Dialog::Quit { lost });
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Questions that the window asks in front of everything else.
+
+use super::command::MenuCommand;
+use std::path::{Path, PathBuf};
+
+/// An open question.
+#[derive(Clone, Debug)]
+pub enum Dialog {
+    /// Where something shall be written.
+    WriteTo {
+        /// What: one of the export and save commands.
+        what: MenuCommand,
+        /// The path as it is typed.
+        path: String,
+    },
+    /// Whether unsaved work may be lost.
+    Quit {
+        /// What would be lost.
+        lost: Vec<String>,
+    },
+    /// The table of shortcuts.
+    Shortcuts,
+    /// Versions and licences.
+    About,
+}
+
+impl Dialog {
+    /// Asks where something shall be written, with a proposal.
+    pub fn write_to(what: MenuCommand, proposal: &Path) -> Self {
+        Self::WriteTo { what, path: proposal.display().to_string() }
+    }
+
+    /// Takes the path that a person has chosen in the system's dialog.
+    pub fn chosen(&mut self, chosen: &Path) {
+        if let Self::WriteTo { path, .. } = self {
+            *path = chosen.display().to_string();
+        }
+    }
+}
+
+/// What a question was answered with.
+#[derive(Clone, Debug)]
+pub enum Reply {
+    /// Write it there.
+    Write(MenuCommand, PathBuf),
+    /// Choose a path in the system's dialog.
+    Browse(MenuCommand),
+    /// Save what is unsaved, then quit.
+    SaveAndQuit,
+    /// Quit all the same.
+    Quit,
+    /// Nothing; close the question.
+    Close,
+}

@@ -1,0 +1,98 @@
+//! How the belief is drawn in three dimensions: what colour says, which voxels, and the legend.
+
+use super::legend;
+use crate::colors::{self, Colormap, Rgb};
+use crate::workbench::command::Command;
+use crate::workbench::model::{ColourBy, LayoutKind, Model};
+use rerun::external::egui;
+
+/// Draws the choices below the three-dimensional views. `drawn` is the number of voxels that are shown.
+pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<Command>) {
+    let ceiling = model.session().map_or(0.40, |session| session.record.scene.shelf.size[2]);
+    let layout = model.kept.layout;
+    let display = &mut model.kept.display;
+    ui.horizontal_wrapped(|ui| {
+        if layout == LayoutKind::Gains {
+            ui.label("gain per voxel, nats");
+            scale(ui, Colormap::Cividis, "gain", ["0", "most"], "nats");
+            return;
+        }
+        ui.label("colour by");
+        let combo = egui::ComboBox::from_id_salt("colour by").width(96.0).selected_text(display.colour_by.title());
+        let shown = combo.show_ui(ui, |ui| {
+            for kind in ColourBy::ALL {
+                ui.selectable_value(&mut display.colour_by, kind, kind.title());
+            }
+        });
+        shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::ComboBox, true, "Colour by"));
+        shown.response.on_hover_text("What the colour of a voxel says");
+        let banded = !matches!(display.colour_by, ColourBy::Error | ColourBy::Change);
+        if banded {
+            ui.label("band");
+            range(ui, &mut display.band, 0.0..=1.0, 0.01, "", "probability");
+        }
+        ui.label("height");
+        range(ui, &mut display.clip_m, 0.0..=ceiling, 0.005, " m", "height above the board");
+        ui.checkbox(&mut display.truth, "truth").on_hover_text("The true objects as glass");
+        ui.checkbox(&mut display.views, "views").on_hover_text("The candidate views as frusta, coloured by gain");
+        ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
+        ui.separator();
+        key(ui, display.colour_by);
+        ui.weak(format!("{drawn} voxels")).on_hover_text("Drawn; only the surface of what is inside the band shows");
+    });
+}
+
+/// A colour scale of a fixed width.
+fn scale(ui: &mut egui::Ui, map: Colormap, name: &str, ends: [&str; 2], unit: &str) {
+    ui.scope(|ui| {
+        ui.set_max_width(180.0);
+        ui.vertical(|ui| {
+            let texts = legend::Bar { name, ends: ends.map(str::to_owned), unit, hint: "" };
+            legend::bar(ui, &texts, move |t| map.rgb(t));
+        });
+    });
+}
+
+/// The legend of a colouring.
+fn key(ui: &mut egui::Ui, by: ColourBy) {
+    match by {
+        ColourBy::Probability => scale(ui, Colormap::Viridis, "probability", ["0", "1"], "probability"),
+        ColourBy::Entropy => scale(ui, Colormap::Magma, "entropy", ["0", "0.69"], "nats"),
+        ColourBy::Change => scale(ui, Colormap::Diverging, "change", ["−1", "+1"], "change of probability"),
+        ColourBy::Class => {
+            ui.weak("class colours as in the maps");
+        }
+        ColourBy::Error => {
+            let entries: [(Rgb, &str); 3] = [
+                ([226, 228, 232], "right"),
+                (colors::MISSED_RGB, "missed"),
+                (colors::HALLUCINATED_RGB, "hallucinated"),
+            ];
+            for (rgb, name) in entries {
+                legend::swatch(ui, rgb, name);
+            }
+        }
+    }
+}
+
+/// Two numbers that stay in order.
+fn range(
+    ui: &mut egui::Ui,
+    [low, high]: &mut [f32; 2],
+    within: std::ops::RangeInclusive<f32>,
+    speed: f32,
+    suffix: &str,
+    what: &str,
+) {
+    for (value, end) in [(low, "Least"), (high, "Most")] {
+        let drag = egui::DragValue::new(value)
+            .range(within.clone())
+            .speed(speed)
+            .fixed_decimals(2)
+            .suffix(suffix);
+        let name = format!("{end} {what}");
+        let response = ui.add(drag);
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::DragValue, true, &name));
+        response.on_hover_text(format!("{name} of the voxels that are drawn; drag, or click to type"));
+    }
+}

@@ -1,0 +1,150 @@
+//! Dialogs and toasts.
+
+use crate::workbench::command::{Command, Level, MenuCommand};
+use crate::workbench::dialog::{Dialog, Reply};
+use crate::workbench::toasts::Toasts;
+use rerun::external::egui;
+use std::path::PathBuf;
+
+/// Draws an open question; the answer, once there is one.
+pub fn show(ctx: &egui::Context, dialog: &mut Dialog) -> Option<Reply> {
+    let mut reply = None;
+    let modal = egui::Modal::new(egui::Id::new("dialog")).show(ctx, |ui| match dialog {
+        Dialog::WriteTo { what, path } => reply = write_to(ui, *what, path),
+        Dialog::Quit { lost } => reply = quit(ui, lost),
+        Dialog::Shortcuts => shortcuts(ui),
+        Dialog::About => about(ui),
+    });
+    if matches!(dialog, Dialog::Shortcuts | Dialog::About) {
+        let closed = modal.response.ctx.input(|input| input.key_pressed(egui::Key::Escape));
+        if closed {
+            reply = Some(Reply::Close);
+        }
+    }
+    if modal.should_close() {
+        reply = Some(Reply::Close);
+    }
+    reply
+}
+
+fn write_to(ui: &mut egui::Ui, what: MenuCommand, path: &mut String) -> Option<Reply> {
+    ui.set_width(520.0);
+    ui.heading(what.title().trim_end_matches('…'));
+    ui.label(what.tooltip());
+    ui.add_space(6.0);
+    let mut reply = None;
+    ui.horizontal(|ui| {
+        let label = ui.label("Write to");
+        ui.add(egui::TextEdit::singleline(path).desired_width(340.0)).labelled_by(label.id);
+        if ui.button("Browse…").clicked() {
+            reply = Some(Reply::Browse(what));
+        }
+    });
+    ui.add_space(6.0);
+    ui.horizontal(|ui| {
+        if ui.add_enabled(!path.trim().is_empty(), egui::Button::new("Write")).clicked() {
+            reply = Some(Reply::Write(what, PathBuf::from(path.trim())));
+        }
+        if ui.button("Do not write").clicked() {
+            reply = Some(Reply::Close);
+        }
+    });
+    reply
+}
+
+fn quit(ui: &mut egui::Ui, lost: &[String]) -> Option<Reply> {
+    ui.set_width(420.0);
+    ui.heading("Quit with unsaved work?");
+    ui.label("Episodes are written as they run. Not saved yet:");
+    for what in lost {
+        ui.label(format!("•  {what}"));
+    }
+    ui.add_space(6.0);
+    let mut reply = None;
+    ui.horizontal(|ui| {
+        if ui.button("Save and quit").clicked() {
+            reply = Some(Reply::SaveAndQuit);
+        }
+        if ui.button("Quit without saving").clicked() {
+            reply = Some(Reply::Quit);
+        }
+        if ui.button("Stay").clicked() {
+            reply = Some(Reply::Close);
+        }
+    });
+    reply
+}
+
+fn shortcuts(ui: &mut egui::Ui) {
+    ui.heading("Keyboard shortcuts");
+    let entries: Vec<MenuCommand> = MenuCommand::all().filter(|entry| entry.shortcut().is_some()).collect();
+    let half = entries.len().div_ceil(2);
+    ui.horizontal_top(|ui| {
+        for (at, part) in entries.chunks(half).enumerate() {
+            egui::Grid::new(("shortcuts", at)).num_columns(2).spacing([16.0, 4.0]).striped(true).show(ui, |ui| {
+                for entry in part {
+                    let keys = entry.shortcut().map(|keys| ui.ctx().format_shortcut(&keys)).unwrap_or_default();
+                    ui.monospace(keys);
+                    ui.label(entry.title()).on_hover_text(entry.tooltip());
+                    ui.end_row();
+                }
+            });
+            ui.add_space(20.0);
+        }
+    });
+    ui.weak("In the editor: arrows move, R turns. Esc closes this.");
+}
+
+fn about(ui: &mut egui::Ui) {
+    ui.set_width(380.0);
+    ui.heading("Nudge");
+    ui.label("A workbench for manipulation-enhanced mapping: look, push, and know how sure you are.");
+    ui.add_space(6.0);
+    egui::Grid::new("versions").num_columns(2).spacing([16.0, 2.0]).show(ui, |ui| {
+        for (name, version) in [("Nudge", nudge_core::VERSION), ("Rerun viewer", "0.36.3"), ("egui", "0.36")] {
+            ui.weak(name);
+            ui.monospace(version);
+            ui.end_row();
+        }
+    });
+    ui.add_space(6.0);
+    ui.label("MIT or Apache-2.0, as you like. No network access, no analytics, no open port.");
+    ui.weak("Esc closes this.");
+}
+
+/// Draws the messages at the lower right.
+pub fn toasts(ctx: &egui::Context, toasts: &mut Toasts, _ask: &mut Vec<Command>) {
+    let shown = toasts.shown().to_vec();
+    if shown.is_empty() {
+        return;
+    }
+    // They fade by themselves.
+    ctx.request_repaint_after(std::time::Duration::from_millis(500));
+    let mut closed = None;
+    egui::Area::new(egui::Id::new("toasts")).anchor(egui::Align2::RIGHT_BOTTOM, [-12.0, -40.0]).show(ctx, |ui| {
+        for toast in &shown {
+            egui::Frame::popup(ui.style()).show(ui, |ui| {
+                ui.set_max_width(420.0);
+                ui.horizontal_wrapped(|ui| {
+                    let (mark, color) = match toast.level {
+                        Level::Info => ("ℹ", ui.visuals().hyperlink_color),
+                        Level::Warning => ("⚠ Warning:", ui.visuals().warn_fg_color),
+                        Level::Error => ("✖ Error:", ui.visuals().error_fg_color),
+                    };
+                    ui.colored_label(color, mark);
+                    ui.label(&toast.text);
+                    let close = ui.small_button("×");
+                    close.widget_info(|| {
+                        egui::WidgetInfo::labeled(egui::WidgetType::Button, true, "Close message")
+                    });
+                    if close.clicked() {
+                        closed = Some(toast.text.clone());
+                    }
+                });
+            });
+        }
+    });
+    if let Some(text) = closed {
+        toasts.close(&text);
+    }
+}

@@ -1,0 +1,146 @@
+//! The window rendered without a display: the same [`App`], on software Vulkan or GL.
+
+use super::app::{App, Options};
+use super::command::Command;
+use super::model::{LayoutKind, Picked};
+use egui_kittest::Harness;
+use image::RgbImage;
+use nudge_core::plan::Action;
+use nudge_core::{Error, Result};
+use rerun::external::{egui, re_viewer};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// What shall be on the picture.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// A scene, or an episode's directory.
+    pub open: PathBuf,
+    /// A second episode, for the comparison.
+    pub with: Option<PathBuf>,
+    /// Number of actions after which it is shown; the last state unless told.
+    pub step: Option<usize>,
+    /// The layout.
+    pub layout: LayoutKind,
+    /// Width and height, points.
+    pub size: [u32; 2],
+    /// Pixels per point.
+    pub scale: f32,
+    /// Light instead of dark.
+    pub light: bool,
+}
+
+/// How long a picture may take to come to rest.
+const PATIENCE: Duration = Duration::from_secs(300);
+/// Frames after everything is done, so that what was logged is drawn and animations have ended.
+const CALM_FRAMES: usize = 25;
+
+/// Renders the window. New episodes go to `out`, a folder of the caller's.
+///
+/// # Errors
+/// When the file cannot be opened, or there is no graphics driver, not even a software one.
+pub fn shoot(shot: &Shot, out: PathBuf) -> Result<RgbImage> {
+    let options = Options {
+        out,
+        light: Some(shot.light),
+        layout: Some(shot.layout),
+        look_only: true,
+        ..Options::default()
+    };
+    let [width, height] = shot.size.map(|n| n as f32);
+    let setup = re_viewer::native::eframe_options(None).wgpu_options.wgpu_setup;
+    let mut harness = Harness::<App>::builder()
+        .with_size(egui::vec2(width, height))
+        .with_pixels_per_point(shot.scale)
+        .wgpu_setup(setup)
+        .build_eframe(|cc| App::new(cc, options));
+    if let Some(reason) = harness.state().no_viewer() {
+        return Err(Error::Usage(format!("no graphics driver for a picture: {reason}")));
+    }
+    open(&mut harness, &shot.open)?;
+    let first = harness.state().model.shown;
+    if let Some(with) = &shot.with {
+        open(&mut harness, with)?;
+        let second = harness.state().model.shown;
+        if let Some(first) = first {
+            harness.state_mut().ask(Command::Show(first));
+        }
+        harness.state_mut().ask(Command::CompareWith(second));
+    }
+    harness.state_mut().ask(Command::Layout(shot.layout));
+    choose(harness.state_mut(), shot);
+    settle(&mut harness)?;
+    explain(harness.state_mut(), shot.layout);
+    settle(&mut harness)?;
+    let picture = harness.render().map_err(Error::Usage)?;
+    Ok(image::DynamicImage::ImageRgba8(picture).into_rgb8())
+}
+
+/// Opens a file and waits until it is there; what went wrong is the toast's text.
+fn open(harness: &mut Harness<'_, App>, path: &std::path::Path) -> Result<()> {
+    let before = harness.state().model.sessions.len();
+    harness.state_mut().ask(Command::Open(path.to_owned()));
+    settle(harness)?;
+    let app = harness.state_mut();
+    if app.model.sessions.len() > before || app.model.kept.layout == LayoutKind::Author {
+        return Ok(());
+    }
+    let said = app.model.toasts.shown().last().map(|toast| toast.text.clone());
+    Err(Error::Usage(said.unwrap_or_else(|| format!("{}: could not be opened", path.display()))))
+}
+
+/// Runs frames until nothing is under way any more, and some more.
+fn settle(harness: &mut Harness<'_, App>) -> Result<()> {
+    let started = Instant::now();
+    let mut calm = 0;
+    while calm < CALM_FRAMES {
+        if started.elapsed() > PATIENCE {
+            return Err(Error::Usage("the window did not come to rest".to_owned()));
+        }
+        harness.step();
+        calm = if harness.state().is_busy() { 0 } else { calm + 1 };
+        std::thread::sleep(Duration::from_millis(15));
+    }
+    Ok(())
+}
+
+/// Moves the cursor; without a step to where the layout has most to show.
+fn choose(app: &mut App, shot: &Shot) {
+    let Some(session) = app.model.session() else { return };
+    let before_push = session.moments.iter().rev().find_map(|moment| {
+        let pushed = matches!(moment.outcome.as_ref()?.record.action, Action::Push(_));
+        pushed.then(|| moment.step - 1)
+    });
+    let step = shot.step.or(before_push.filter(|_| shot.layout == LayoutKind::Push)).unwrap_or(session.steps());
+    let undecided = session.decision_after(step).is_none() && !session.is_finished() && session.read_only.is_none();
+    app.ask(Command::GoTo(step));
+    if undecided {
+        app.ask(Command::Decide);
+    }
+}
+
+/// Asks what the layout is there to answer.
+fn explain(app: &mut App, layout: LayoutKind) {
+    let Some(session) = app.model.session() else { return };
+    let decision = session.decision_after(app.model.cursor).or_else(|| session.moment(app.model.cursor).decision());
+    match layout {
+        LayoutKind::Why => {
+            let entropy = app.model.derived().map(|derived| crate::picture::cell_entropy(&derived.belief));
+            let most = entropy.and_then(|entropy| (0..entropy.len()).max_by(|&a, &b| entropy[a].total_cmp(&entropy[b])));
+            app.ask(Command::Pick(most.map(Picked::Cell)));
+        }
+        LayoutKind::Gains => {
+            if let Some(view) = decision.and_then(|decision| decision.pair.first().copied()) {
+                app.ask(Command::GainOf(view));
+            }
+        }
+        LayoutKind::Push => {
+            let best = decision.and_then(|decision| Some((decision.best_push?, decision)));
+            if let Some((at, push)) = best.and_then(|(at, decision)| Some((at, decision.candidates.get(at)?.push))) {
+                app.model.candidate = Some(at);
+                app.ask(Command::Preview(push));
+            }
+        }
+        LayoutKind::Episode | LayoutKind::Compare | LayoutKind::Author => {}
+    }
+}

@@ -8,7 +8,7 @@
 //! Entity names are in [`paths`] and nowhere else.
 
 mod blueprint;
-mod decision;
+pub(crate) mod decision;
 mod floor;
 mod layout;
 pub mod paths;

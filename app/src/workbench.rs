@@ -9,6 +9,8 @@ pub mod annotations;
 pub mod author;
 pub mod command;
 pub mod derive;
+#[cfg(test)]
+pub mod fixture;
 pub mod half_belief;
 pub mod model;
 pub mod panels;

@@ -120,7 +120,8 @@ impl Played {
 }
 
 static SMALL: LazyLock<Played> = LazyLock::new(|| Script::small().play());
-static STRAY: LazyLock<Played> = LazyLock::new(|| Script { stray_at: 2, push_at: 0, steps: 3, ..Script::small() }.play());
+static STRAY: LazyLock<Played> =
+    LazyLock::new(|| Script { stray_at: 2, push_at: 0, steps: 3, ..Script::small() }.play());
 
 /// Five actions, the fourth of them a push; budget six.
 pub fn session(id: u32) -> Session {
@@ -156,10 +157,8 @@ pub fn answer(model: &mut Model) {
     let Some(session) = model.session() else { return };
     let step = model.cursor.min(session.steps());
     let belief = session.moment(step).belief.belief();
-    let push = model
-        .candidate
-        .and_then(|at| session.decision_after(step)?.candidates.get(at))
-        .map(|candidate| candidate.push);
+    let push =
+        model.candidate.and_then(|at| session.decision_after(step)?.candidates.get(at)).map(|candidate| candidate.push);
     let preview = push.map(|push| {
         let swept = session.setup.tool.swept_volume(&push, &belief.grid);
         let pushes = [SweptPush { push, swept: swept.clone() }];

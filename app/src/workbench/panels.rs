@@ -13,6 +13,7 @@ pub mod maps;
 pub mod push;
 pub mod why;
 
+mod arrows;
 mod floor;
 mod legend;
 mod push_review;

@@ -49,8 +49,13 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model) {
     let Some((step, image)) = found else {
         return empty(ui, "No image yet: decide, or choose a view to look from");
     };
-    let when = if step == until { format!("step {step}") } else { format!("step {step}, the last look before {until}") };
-    heading(ui, format!("Camera: view {} at {when}", image.view.0), "What the robot's camera saw; the belief is made of this");
+    let when =
+        if step == until { format!("step {step}") } else { format!("step {step}, the last look before {until}") };
+    heading(
+        ui,
+        format!("Camera: view {} at {when}", image.view.0),
+        "What the robot's camera saw; the belief is made of this",
+    );
     let gap = 10.0;
     let columns = if ui.available_width() < 300.0 { 1 } else { 2 };
     let width = ((ui.available_width() - gap * (columns - 1) as f32) / columns as f32).floor().max(40.0);

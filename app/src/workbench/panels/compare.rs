@@ -99,9 +99,7 @@ fn header(ui: &mut Ui, model: &Model, a: &Session, b: Option<&Session>, ask: &mu
                 ui.selectable_value(&mut chosen, Some(session.id), format!("{} ({})", session.title(), session.id.0));
             }
         });
-        combo.response.widget_info(|| {
-            egui::WidgetInfo::labeled(egui::WidgetType::ComboBox, true, "Compare with")
-        });
+        combo.response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::ComboBox, true, "Compare with"));
         combo.response.labelled_by(label.id).on_hover_text("The second episode; both follow one clock");
         if chosen != before {
             ask.push(Command::CompareWith(chosen));
@@ -222,13 +220,22 @@ fn floor(
             heading(ui, format!("{letter}: {}", kind.title().to_lowercase()), "");
             let key = Shown::Map(derived.of.0, derived.of.1, kind);
             let picture = state.textures.get(ui.ctx(), key, || {
-                derived.maps.get(&kind).map_or_else(|| ColorImage::filled([1, 1], egui::Color32::GRAY), textures::of_rgb)
+                derived
+                    .maps
+                    .get(&kind)
+                    .map_or_else(|| ColorImage::filled([1, 1], egui::Color32::GRAY), textures::of_rgb)
             });
             let outlines = state.outlines[which].of(&session.moment(derived.of.1).bodies);
             show_floor(ui, model, derived, Some(&picture), &outlines, letter, ask, |cell| {
-                let (class, certainty) = (picture::believed_class(&derived.belief, cell), derived.belief.likeliest(cell).1);
-                let name = class.map_or("unknown".to_owned(), |class| colors::class_title(&session.setup.catalog, class));
-                format!("{}\n{name}, probability {}", words::cell_place(&grid, grid.cell(cell)), words::probability(certainty))
+                let (class, certainty) =
+                    (picture::believed_class(&derived.belief, cell), derived.belief.likeliest(cell).1);
+                let name =
+                    class.map_or("unknown".to_owned(), |class| colors::class_title(&session.setup.catalog, class));
+                format!(
+                    "{}\n{name}, probability {}",
+                    words::cell_place(&grid, grid.cell(cell)),
+                    words::probability(certainty)
+                )
             });
         }
         Place::Difference => {

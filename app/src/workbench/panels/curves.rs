@@ -26,7 +26,8 @@ pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     let other = model.other_session().filter(|_| model.kept.layout == LayoutKind::Compare);
     let asked = ask.len();
     let curves = Curves { session, other, cursor: model.cursor };
-    let shares: Vec<&Series> = SHARES.iter().filter_map(|key| SERIES.iter().find(|series| series.key == *key)).collect();
+    let shares: Vec<&Series> =
+        SHARES.iter().filter_map(|key| SERIES.iter().find(|series| series.key == *key)).collect();
     let entropy: Vec<&Series> = SERIES.iter().filter(|series| series.key == ENTROPY).collect();
     let (gap, height) = (12.0, ui.available_height().max(90.0));
     if ui.available_width() >= 560.0 {
@@ -89,9 +90,9 @@ impl Curves<'_> {
         let axis = |hints: AxisHints<'static>| {
             hints.label("").tick_label_font(font.clone()).tick_label_color(ui.visuals().text_color())
         };
-        let x_axis = axis(AxisHints::new_x()).label_spacing(Rangef::new(12.0, 16.0)).formatter(|mark, _| {
-            if mark.value < -0.5 { String::new() } else { format!("{:.0}", mark.value) }
-        });
+        let x_axis = axis(AxisHints::new_x())
+            .label_spacing(Rangef::new(12.0, 16.0))
+            .formatter(|mark, _| if mark.value < -0.5 { String::new() } else { format!("{:.0}", mark.value) });
         let y_axis = axis(AxisHints::new_y())
             .label_spacing(Rangef::new(14.0, 22.0))
             .min_thickness(34.0)

@@ -97,7 +97,7 @@ fn verdict(ui: &mut Ui, decision: &Decision, gamma: f32) {
     if weighed {
         bar(ui, "Push: IGM", decision.igm, 0.5, ruled && !looks, "IGM: best single view after the best push, nats");
         let reg = gamma * decision.reg;
-        let hint = "What the push would blur, nats, at most 0: γ·Reg, Reg = min(0, H(labels) − H(labels, predicted))";
+        let hint = "What the push would blur, at most 0: Reg = min(0, H(labels) − H(labels, predicted))";
         bar(ui, "γ·Reg", reg, 0.1, false, hint);
         let gap = look - push;
         let text = format!("IGV − (IGM + γ·Reg) = {}", words::nats(gap));

@@ -1,8 +1,8 @@
-//! A floor map on the screen: the picture, the outlines of what really stands there, the picked cell, and the cell under
-//! the pointer. Seen from above, the front edge at the bottom.
+//! A floor map on the screen: the picture, the outlines of what really stands there, the picked cell, and the cell
+//! under the pointer. Seen from above, the front edge at the bottom.
 
 use nudge_core::Point;
-use nudge_core::grid::Grid;
+use nudge_core::grid::{Grid, Window};
 use nudge_core::scene::Body;
 use nudge_core::solid::convex_outline;
 use rerun::external::egui::{
@@ -42,6 +42,14 @@ fn outline(body: &Body) -> Line {
         })
         .collect();
     convex_outline(&mut points)
+}
+
+/// Where a cell is in the arrays of a window of the floor plan; `None` outside it.
+pub fn in_window(window: &Window, grid: &Grid, cell: usize) -> Option<usize> {
+    let at = grid.cell(cell);
+    let (x, y) = (usize::from(at.x), usize::from(at.y));
+    let inside = (window.x[0]..window.x[1]).contains(&x) && (window.y[0]..window.y[1]).contains(&y);
+    inside.then(|| (x - window.x[0]) * window.size()[1] + y - window.y[0])
 }
 
 /// Where the floor plan is on the screen.
@@ -117,8 +125,7 @@ impl FloorMap<'_> {
     pub fn show(&self, ui: &mut Ui, width: f32) -> Drawn {
         let [across_m, depth_m, _] = self.grid.size_m();
         let scale = width / across_m;
-        let (rect, response) =
-            ui.allocate_exact_size(vec2(width, (depth_m + self.apron_m) * scale), Sense::click());
+        let (rect, response) = ui.allocate_exact_size(vec2(width, (depth_m + self.apron_m) * scale), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(WidgetType::Image, true, self.name));
         let frame = Frame { board: rect.with_max_y(rect.top() + depth_m * scale), grid: *self.grid };
         let over = response.hover_pos().and_then(|at| frame.cell_at(at));
@@ -143,7 +150,12 @@ impl FloorMap<'_> {
         let front = Stroke::new(2.0, ui.visuals().strong_text_color());
         painter.hline(frame.board.x_range(), frame.board.bottom() - 1.0, front);
         if let Some(cell) = over {
-            painter.rect_stroke(frame.cell(cell).expand(1.0), 0.0, Stroke::new(1.0, Color32::WHITE), StrokeKind::Outside);
+            painter.rect_stroke(
+                frame.cell(cell).expand(1.0),
+                0.0,
+                Stroke::new(1.0, Color32::WHITE),
+                StrokeKind::Outside,
+            );
         }
         if let Some(cell) = self.picked {
             mark(&painter, frame.cell(cell));
@@ -177,6 +189,16 @@ fn mark(painter: &Painter, cell: Rect) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_window_lists_its_cells_in_its_own_order() {
+        let grid = Grid::for_shelf([0.08, 0.06, 0.02], 0.01);
+        let window = Window { x: [2, 5], y: [1, 4] };
+        let listed: Vec<usize> = window.cells(&grid).collect();
+        for cell in 0..grid.cell_count() {
+            assert_eq!(in_window(&window, &grid, cell), listed.iter().position(|other| *other == cell));
+        }
+    }
 
     #[test]
     fn cells_are_found_where_they_are_drawn() {

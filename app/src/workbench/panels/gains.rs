@@ -62,7 +62,11 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, _ask: &mut Vec<Command>) 
     egui::ScrollArea::vertical().id_salt("gains").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 4.0;
         let step = model.cursor.min(session.steps()) + 1;
-        heading(ui, format!("Gain of every view before step {step}"), "IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), nats");
+        heading(
+            ui,
+            format!("Gain of every view before step {step}"),
+            "IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), nats",
+        );
         map.show(ui, &mut touched);
         ui.add_space(6.0);
         let Some(view) = model.view.and_then(|view| session.setup.views.view(view)) else {
@@ -132,7 +136,11 @@ impl<'a> HeatMap<'a> {
             let hint = "One scale for all targets, from the smallest to the largest gain of this step";
             legend::bar(ui, &Bar { name: "gain", ends, unit: "nats", hint }, |t| Colormap::Cividis.rgb(t));
         });
-        ui.label(RichText::new("framed 1 and 2: best pair; hatched: used since the last push; from the front, left is left").small().weak());
+        ui.label(
+            RichText::new("framed 1 and 2: best pair; hatched: used since the last push; from the front, left is left")
+                .small()
+                .weak(),
+        );
     }
 
     fn one(&self, ui: &mut Ui, target: u16, size: egui::Vec2, side: f32, touched: &mut Touched) {
@@ -141,7 +149,8 @@ impl<'a> HeatMap<'a> {
             let [x, y, z] = view.target.map(words::metres);
             format!("looks at {x}, {y}, {z} m")
         });
-        ui.label(RichText::new(title).small()).on_hover_text("The look-at target: x to the right, y into the shelf, z up");
+        ui.label(RichText::new(title).small())
+            .on_hover_text("The look-at target: x to the right, y into the shelf, z up");
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
         response.widget_info(|| {
             WidgetInfo::labeled(WidgetType::Image, true, format!("Gain of the views at target {}", target + 1))
@@ -205,7 +214,9 @@ impl<'a> HeatMap<'a> {
     /// Position, target and gain of the chosen view.
     fn numbers(&self, ui: &mut Ui, view: &View) {
         let (gain, best) = (self.gain(view.id), weighed::best_gain(self.decision));
-        let place = |at: [f32; 3]| format!("x {}, y {}, z {} m", words::metres(at[0]), words::metres(at[1]), words::metres(at[2]));
+        let place = |at: [f32; 3]| {
+            format!("x {}, y {}, z {} m", words::metres(at[0]), words::metres(at[1]), words::metres(at[2]))
+        };
         heading(ui, format!("View {}", view.id.0), "The view that was clicked");
         let at = view.position();
         let rows = [
@@ -213,8 +224,11 @@ impl<'a> HeatMap<'a> {
             ("of the best", words::percent(gain / best), "Share of the best view's gain"),
             ("camera at", place([at.x, at.y, at.z]), "x to the right, y into the shelf, z up"),
             ("looks at", place(view.target), "The look-at target"),
-            ("used", if self.used.contains(&view.id) { "since the last push" } else { "not since the last push" }.to_owned(),
-             "A view is not looked from twice until a push has moved something"),
+            (
+                "used",
+                if self.used.contains(&view.id) { "since the last push" } else { "not since the last push" }.to_owned(),
+                "A view is not looked from twice until a push has moved something",
+            ),
         ];
         egui::Grid::new("view numbers").num_columns(2).spacing([14.0, 2.0]).show(ui, |ui| {
             for (name, value, hint) in rows {
@@ -269,7 +283,11 @@ fn spread(state: &mut State, ui: &mut Ui, model: &Model, session: &Session, view
             });
         }
     });
-    ui.label(RichText::new(format!("{} from all voxels, nats", words::significant(f64::from(spread.total), 3))).small().weak());
+    ui.label(
+        RichText::new(format!("{} from all voxels, nats", words::significant(f64::from(spread.total), 3)))
+            .small()
+            .weak(),
+    );
 }
 
 impl Spread {
@@ -281,7 +299,8 @@ impl Spread {
             total: 0.0,
         };
         let part = |at: u16, of: usize| (usize::from(at) * PARTS / of.max(1)).min(PARTS - 1);
-        for &(voxel, nats) in source.nats.iter().filter(|(voxel, nats)| *voxel < grid.voxel_count() && nats.is_finite()) {
+        for &(voxel, nats) in source.nats.iter().filter(|(voxel, nats)| *voxel < grid.voxel_count() && nats.is_finite())
+        {
             let at = grid.voxel(voxel);
             spread.by_height[part(at.z, grid.dims[2])] += nats;
             spread.by_depth[part(at.y, grid.dims[1])] += nats;
@@ -328,7 +347,8 @@ mod tests {
     fn a_gain_is_parted_by_height_and_depth() {
         let grid = Grid::for_shelf([0.8, 0.4, 0.4], 0.01);
         let at = |y: u16, z: u16| grid.index(Voxel { x: 3, y, z });
-        let nats = vec![(at(0, 39), 1.0), (at(39, 0), 2.0), (at(39, 5), 4.0), (grid.voxel_count(), 9.0), (at(1, 1), f32::NAN)];
+        let nats =
+            vec![(at(0, 39), 1.0), (at(39, 0), 2.0), (at(39, 5), 4.0), (grid.voxel_count(), 9.0), (at(1, 1), f32::NAN)];
         let source = GainSource { of: (SessionId(0), 1), view: ViewId(3), nats: Arc::new(nats) };
         let spread = Spread::of(&source, &grid);
         assert_eq!((spread.by_height[0], spread.by_height[1], spread.by_height[7]), (2.0, 4.0, 1.0));

@@ -91,10 +91,7 @@ pub fn swatch(ui: &mut Ui, rgb: Rgb, name: &str) -> Response {
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, name));
     if ui.is_rect_visible(rect) {
-        let square = egui::Rect::from_center_size(
-            pos2(rect.left() + 0.5 * SIDE, rect.center().y),
-            vec2(SIDE, SIDE),
-        );
+        let square = egui::Rect::from_center_size(pos2(rect.left() + 0.5 * SIDE, rect.center().y), vec2(SIDE, SIDE));
         let edge = Stroke::new(1.0, ui.visuals().weak_text_color().gamma_multiply(0.6));
         ui.painter().rect(square, 2.0, ink(rgb), edge, StrokeKind::Inside);
         let at = pos2(rect.left() + SIDE + 4.0, rect.center().y - 0.5 * galley.size().y);

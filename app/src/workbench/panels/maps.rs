@@ -103,7 +103,8 @@ fn controls(ui: &mut Ui, grid: &Grid, slice_m: Option<f32>, drawn: usize, cursor
         }
         if let Some(at) = &mut chosen {
             *at = at.clamp(0.0, height);
-            let slider = Slider::new(at, 0.0..=height).custom_formatter(|m, _| format!("{m:.3} m")).text("Slice height");
+            let slider =
+                Slider::new(at, 0.0..=height).custom_formatter(|m, _| format!("{m:.3} m")).text("Slice height");
             ui.add(slider).on_hover_text(format!("Height above the board, 0 to {height:.2} m"));
         } else if drawn != cursor {
             ui.spinner();
@@ -152,7 +153,11 @@ fn map(
     }
     .show(ui, ui.available_width());
     drawn.tell(|cell| {
-        format!("{}\n{}", words::cell_place(&grid, grid.cell(cell)), value(derived, &moment.truth, session, shown, cell))
+        format!(
+            "{}\n{}",
+            words::cell_place(&grid, grid.cell(cell)),
+            value(derived, &moment.truth, session, shown, cell)
+        )
     });
     if drawn.response.clicked()
         && let Some(cell) = drawn.over
@@ -193,7 +198,9 @@ fn map_legend(ui: &mut Ui, shown: Shown, grid: &Grid) {
         legend::bar(ui, &Bar { name, ends: ["0".to_owned(), high], unit, hint }, |t| map.rgb(t));
     };
     match shown {
-        Shown::Slice(_) => bar(ui, Colormap::Viridis, "occupancy", "1".into(), "probability", "p from free to occupied"),
+        Shown::Slice(_) => {
+            bar(ui, Colormap::Viridis, "occupancy", "1".into(), "probability", "p from free to occupied")
+        }
         Shown::Map(MapKind::Certainty) => {
             bar(ui, Colormap::Viridis, "certainty", "1".into(), "probability", "A cell above 0.85 counts as known");
         }
@@ -255,10 +262,8 @@ fn value(derived: &Derived, truth: &TruthMap, session: &Session, shown: Shown, c
         Shown::Map(MapKind::Entropy) => {
             let levels = belief.grid.levels_below(SCORED_HEIGHT_M);
             let column = &belief.occupancy[belief.grid.column(cell)][..levels];
-            let (class, all) = (
-                dirichlet_entropy(&belief.semantics[cell]),
-                picture::column_entropy(column, &belief.semantics[cell]),
-            );
+            let (class, all) =
+                (dirichlet_entropy(&belief.semantics[cell]), picture::column_entropy(column, &belief.semantics[cell]));
             format!("{}, of which the class {}", words::nats(all), words::nats(class))
         }
         Shown::Map(MapKind::Truth) => true_class(),

@@ -1,7 +1,8 @@
 //! What pushes would do: the candidates on the floor, and for a chosen one the prediction beside now and what happened.
 
+use super::arrows::{Look, arrow, ends, nearest, tag};
 use super::decision;
-use super::floor::{Drawn, FloorMap, Frame, Outlines};
+use super::floor::{Drawn, FloorMap, Outlines, in_window};
 use super::legend::{self, Bar};
 use super::push_review::{self, Review};
 use super::table::Sort;
@@ -18,15 +19,11 @@ use nudge_core::belief::PushPrediction;
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, CandidateRecord, Decision};
 use nudge_core::tool::Push;
-use rerun::external::egui::{
-    self, Color32, Painter, Pos2, RichText, Shape, Stroke, TextureHandle, Tooltip, Ui, Vec2,
-};
+use rerun::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
 use std::sync::Arc;
 
 /// How much of the robot's side is shown, metres.
 const APRON_M: f32 = 0.05;
-/// How near the pointer has to be to an arrow, points.
-const NEAR: f32 = 7.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shown {
@@ -216,14 +213,7 @@ impl Here<'_> {
     }
 
     /// What a push would do: now, predicted, the change, and what happened if it was done.
-    fn chosen(
-        &self,
-        state: &mut State,
-        ui: &mut Ui,
-        at: usize,
-        candidate: &CandidateRecord,
-        ask: &mut Vec<Command>,
-    ) {
+    fn chosen(&self, state: &mut State, ui: &mut Ui, at: usize, candidate: &CandidateRecord, ask: &mut Vec<Command>) {
         let gamma = self.session.record.config.planner.gamma;
         heading(ui, format!("Push {at}"), "The push that was clicked");
         let nats = |value: Option<f32>| value.map_or("not weighed".to_owned(), words::nats);
@@ -236,7 +226,8 @@ impl Here<'_> {
             ("from", format!("x {}, y {} m", words::metres(x), words::metres(y)), "Where the tip starts"),
             (
                 "way",
-                format!("{:.0} mm to {:.0}°", candidate.push.length_m * 1e3, candidate.push.direction_deg).replace('-', "−"),
+                format!("{:.0} mm to {:.0}°", candidate.push.length_m * 1e3, candidate.push.direction_deg)
+                    .replace('-', "−"),
                 "Length and direction; 90° is into the shelf",
             ),
         ];
@@ -272,17 +263,14 @@ impl Here<'_> {
         let ctx = ui.ctx().clone();
         let now = self.now(state, &ctx);
         let predicted = state.textures.get(&ctx, key(Shown::Predicted(push)), || {
-            let places = places(&grid, prediction);
             textures::of_rgb(&picture::paint(&grid, |cell| {
-                let after = places[cell].and_then(|at| prediction.semantics.get(at));
+                let at = in_window(&prediction.window, &grid, cell);
+                let after = at.and_then(|at| prediction.semantics.get(at));
                 picture::semantics_rgb(after.unwrap_or(&derived.belief.semantics[cell]), catalog)
             }))
         });
         let change = state.textures.get(&ctx, key(Shown::Change(push)), || {
-            let places = places(&grid, prediction);
-            textures::of_rgb(&picture::paint(&grid, |cell| {
-                Colormap::Viridis.rgb(change_at(&places, prediction, cell))
-            }))
+            textures::of_rgb(&picture::paint(&grid, |cell| Colormap::Viridis.rgb(change_at(prediction, &grid, cell))))
         });
         let after = self.session.moments.get(self.step + 1).filter(|moment| {
             moment.outcome.as_ref().is_some_and(|outcome| outcome.record.action == Action::Push(push))
@@ -292,7 +280,6 @@ impl Here<'_> {
             (state.textures.get(&ctx, key(Shown::After), labels), state.outlines_after.of(&moment.bodies))
         });
         let outlines = state.outlines.of(&self.session.moment(self.step).bodies);
-        let places = places(&grid, prediction);
         let gap = 10.0;
         let width = (0.5 * (ui.available_width() - gap)).floor().clamp(40.0, 420.0);
         let mut one = |ui: &mut Ui, title: &str, hint: &str, picture: Option<&TextureHandle>, outlines: &[_]| {
@@ -306,7 +293,7 @@ impl Here<'_> {
                 let way = ends(&drawn.frame, &push);
                 arrow(&ui.painter_at(drawn.response.rect), way, Look::Weighed(Color32::WHITE), false);
                 drawn.tell(|cell| {
-                    let change = words::probability(change_at(&places, prediction, cell));
+                    let change = words::probability(change_at(prediction, &grid, cell));
                     format!("{}\nchanges with probability {change}", words::cell_place(&grid, grid.cell(cell)))
                 });
                 if let Some(cell) = drawn.over.filter(|_| drawn.response.clicked()) {
@@ -317,7 +304,13 @@ impl Here<'_> {
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = gap;
             one(ui, "Now", "The likeliest classes before the push", now.as_ref(), &outlines);
-            one(ui, "Predicted", "The likeliest classes that the push is predicted to leave", Some(&predicted), &outlines);
+            one(
+                ui,
+                "Predicted",
+                "The likeliest classes that the push is predicted to leave",
+                Some(&predicted),
+                &outlines,
+            );
         });
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = gap;
@@ -371,87 +364,10 @@ fn value_range(decision: &Decision, gamma: f32) -> [f32; 2] {
     if low <= high { [low, high] } else { [0.0, 0.0] }
 }
 
-/// Where every cell is in a prediction's window.
-fn places(grid: &Grid, prediction: &PushPrediction) -> Vec<Option<usize>> {
-    let mut places = vec![None; grid.cell_count()];
-    for (at, cell) in prediction.window.cells(grid).enumerate() {
-        if let Some(place) = places.get_mut(cell) {
-            *place = Some(at);
-        }
-    }
-    places
-}
-
-fn change_at(places: &[Option<usize>], prediction: &PushPrediction, cell: usize) -> f32 {
-    let at = places.get(cell).copied().flatten();
+/// The probability that a push changes a cell; 0 outside the window of its prediction.
+fn change_at(prediction: &PushPrediction, grid: &Grid, cell: usize) -> f32 {
+    let at = in_window(&prediction.window, grid, cell);
     at.and_then(|at| prediction.change.get(at)).copied().unwrap_or(0.0)
-}
-
-/// Both ends of a push on the screen.
-fn ends(frame: &Frame, push: &Push) -> [Pos2; 2] {
-    let end = push.end_point();
-    [frame.place([push.start[0], push.start[1]]), frame.place([end.x, end.y])]
-}
-
-/// The arrow nearest to the pointer, if one is near.
-fn nearest(arrows: &[(usize, &CandidateRecord, [Pos2; 2])], pointer: Pos2) -> Option<usize> {
-    let distance = |[from, to]: [Pos2; 2]| {
-        let way = to - from;
-        let t = ((pointer - from).dot(way) / way.length_sq().max(1e-6)).clamp(0.0, 1.0);
-        (from + way * t).distance(pointer)
-    };
-    let measured = arrows.iter().map(|(at, candidate, ends)| {
-        // Of two that are equally near, the feasible one.
-        (distance(*ends) + if candidate.rejection.is_some() { 1.0 } else { 0.0 }, *at)
-    });
-    let near = measured.filter(|(distance, _)| *distance <= NEAR);
-    near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at)
-}
-
-/// How an arrow looks.
-#[derive(Clone, Copy)]
-enum Look {
-    Weighed(Color32),
-    Rejected,
-}
-
-fn arrow(painter: &Painter, [from, to]: [Pos2; 2], look: Look, picked: bool) {
-    let way = (to - from).normalized();
-    let width = if picked { 3.0 } else { 1.6 };
-    let grey = Color32::from_gray(120);
-    match look {
-        Look::Rejected => {
-            let colour = if picked { Color32::from_gray(60) } else { grey };
-            painter.extend(Shape::dashed_line(&[from, to], Stroke::new(width.min(2.2), colour), 4.0, 3.0));
-            painter.add(head(to, way, 5.0 + width, colour, Stroke::NONE));
-        }
-        Look::Weighed(colour) => {
-            let rim = if picked { Color32::WHITE } else { Color32::from_black_alpha(200) };
-            let back = to - way * 4.0;
-            if picked {
-                painter.line_segment([from, back], Stroke::new(width + 5.0, Color32::BLACK));
-            }
-            painter.line_segment([from, back], Stroke::new(width + 2.4, rim));
-            painter.line_segment([from, back], Stroke::new(width, colour));
-            painter.circle(from, width + 0.6, colour, Stroke::new(1.0, rim));
-            painter.add(head(to, way, 6.0 + 1.5 * width, colour, Stroke::new(1.0, rim)));
-        }
-    }
-}
-
-/// The head of an arrow.
-fn head(tip: Pos2, way: Vec2, length: f32, colour: Color32, stroke: Stroke) -> Shape {
-    let (back, side) = (tip - way * length, way.rot90() * (0.42 * length));
-    Shape::convex_polygon(vec![tip, back + side, back - side], colour, stroke)
-}
-
-/// A word beside an arrow's tip.
-fn tag(ui: &Ui, painter: &Painter, at: Pos2, text: &str) {
-    let galley = painter.layout_no_wrap(text.to_owned(), legend::small(ui), Color32::WHITE);
-    let place = at + Vec2::new(6.0, -0.5 * galley.size().y);
-    let ground = egui::Rect::from_min_size(place, galley.size()).expand2(Vec2::new(3.0, 1.0));
-    painter.rect_filled(ground, 3.0, Color32::from_black_alpha(190));
-    painter.galley(place, galley, Color32::WHITE);
 }
 
 /// A candidate in words, for the tooltip.

@@ -35,12 +35,7 @@ impl Review {
         let both = predicted.as_ref().map_or(0, |predicted| {
             predicted.iter().zip(&changed).filter(|(predicted, changed)| **predicted && **changed).count()
         });
-        Self {
-            of: (id, after.step),
-            predicted: predicted.as_deref().map(count),
-            changed: count(&changed),
-            both,
-        }
+        Self { of: (id, after.step), predicted: predicted.as_deref().map(count), changed: count(&changed), both }
     }
 
     /// Share of the cells predicted to change that did.
@@ -91,7 +86,11 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
     let rows = [
         ("objects moved", format!("{moved} of {}", record.scene.objects.len()), "Objects that moved by more than 2 mm"),
         ("displacement", format!("{:.0} mm", total * 1e3), "Of all objects together"),
-        ("tool went", format!("{:.0} of {:.0} mm", pushed.pushed_m * 1e3, asked * 1e3), "How far the tip moved along the push"),
+        (
+            "tool went",
+            format!("{:.0} of {:.0} mm", pushed.pushed_m * 1e3, asked * 1e3),
+            "How far the tip moved along the push",
+        ),
         ("blocked", if pushed.stalled { "yes" } else { "no" }.to_owned(), "Whether the tool jammed and gave up"),
         ("dropped", dropped, "Objects that left the board"),
         ("cells changed", review.changed.to_string(), "Floor cells in whose column something really changed"),

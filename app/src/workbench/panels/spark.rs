@@ -28,7 +28,8 @@ impl Spark<'_> {
         let last = self.values.len().saturating_sub(1);
         let now = self.values.get(self.cursor.min(last)).copied().unwrap_or(f32::NAN);
         response.widget_info(|| {
-            let label = format!("{} over the steps, {} at step {}", self.name, (self.write)(now), self.cursor.min(last));
+            let label =
+                format!("{} over the steps, {} at step {}", self.name, (self.write)(now), self.cursor.min(last));
             WidgetInfo::labeled(WidgetType::Image, true, label)
         });
         let font = legend::small(ui);

@@ -122,7 +122,11 @@ pub fn show(ui: &mut Ui, id: &str, columns: &[Column], mut rows: Vec<Row>, sort:
             .cell_layout(Layout::right_to_left(Align::Center));
         for (at, column) in columns.iter().enumerate() {
             let last = at + 1 == columns.len();
-            table = table.column(if last { Width::remainder().at_least(column.width).clip(true) } else { Width::exact(column.width) });
+            table = table.column(if last {
+                Width::remainder().at_least(column.width).clip(true)
+            } else {
+                Width::exact(column.width)
+            });
         }
         table
             .header(line + 1.0, |mut header| {

@@ -62,7 +62,11 @@ pub fn pushed(decision: &Decision) -> Option<usize> {
 /// Columns of [`view_rows`].
 pub const VIEW_COLUMNS: [Column; 5] = [
     Column { title: "View", hint: "Number of the view in its array", width: 34.0 },
-    Column { title: "Gain", hint: "Information gain of the view alone, nats: IG(v) = Σ rays Σ voxels H(p)·Π(1 − p)", width: 52.0 },
+    Column {
+        title: "Gain",
+        hint: "Information gain of the view alone, nats: IG(v) = Σ rays Σ voxels H(p)·Π(1 − p)",
+        width: 52.0,
+    },
     Column { title: "Of best", hint: "Share of the best view's gain", width: 46.0 },
     Column { title: "Camera at", hint: "Column, row and look-at target in the array, counted from 1", width: 62.0 },
     Column { title: "Note", hint: "Whether it is chosen, in the best pair, or used since the last push", width: 60.0 },
@@ -115,7 +119,11 @@ pub const PUSH_COLUMNS: [Column; 7] = [
     Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
     Column { title: "Value", hint: "Gain + γ·Reg, nats: what looking has to beat", width: 50.0 },
     Column { title: "Gain", hint: "Best single view after the predicted push, nats", width: 50.0 },
-    Column { title: "γ·Reg", hint: "What the push would blur, nats, at most 0: Reg = min(0, H(labels) − H(labels, predicted))", width: 42.0 },
+    Column {
+        title: "γ·Reg",
+        hint: "What the push would blur, nats, at most 0: Reg = min(0, H(labels) − H(labels, predicted))",
+        width: 42.0,
+    },
     Column { title: "To", hint: "Direction in degrees; 90 is into the shelf, 0 to the right", width: 34.0 },
     Column { title: "mm", hint: "How far the tool pushes, millimetres", width: 30.0 },
     Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 },

@@ -1,5 +1,6 @@
 //! Why a voxel or a floor cell is believed to be what it is: its numbers, their history, and what changed them.
 
+use super::floor::in_window;
 use super::maps::picked_cell;
 use super::spark::{self, Spark};
 use super::{NO_EPISODE, empty, heading, legend, words};
@@ -15,8 +16,8 @@ use nudge_core::plan::Action;
 use nudge_core::scene::{CLASS_COUNT, ClassId};
 use nudge_core::score::SCORED_HEIGHT_M;
 use rerun::external::egui::{
-    self, Align, Align2, Button, Grid as Rows, Label, Layout, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui, WidgetInfo,
-    WidgetType, pos2, vec2,
+    self, Align, Align2, Button, Grid as Rows, Label, Layout, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip,
+    Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 
 /// A predicted probability of change below this is not worth a line.
@@ -113,21 +114,52 @@ impl About<'_> {
                 let p = beta_mean(a);
                 let number = |value: f32| words::significant(f64::from(value), 3);
                 row(ui, "occupied", words::probability(p), "Mean of the Beta, a_occ / (a_occ + a_free), 0 to 1");
-                row(ui, "Beta", format!("{}, {}", number(a[0]), number(a[1])), "Parameters a_occ and a_free, both 1 at the start");
+                row(
+                    ui,
+                    "Beta",
+                    format!("{}, {}", number(a[0]), number(a[1])),
+                    "Parameters a_occ and a_free, both 1 at the start",
+                );
                 ui.end_row();
-                row(ui, "variance", number(beta_variance(a)), "Of the Beta, what is not known about p: 1/12 at the start, less with evidence");
+                row(
+                    ui,
+                    "variance",
+                    number(beta_variance(a)),
+                    "Of the Beta, what is not known about p: 1/12 at the start, less with evidence",
+                );
                 row(ui, "entropy", words::nats(bernoulli_entropy(p)), "H(p), 0 to ln 2 = 0.693 nats");
                 ui.end_row();
-                let truth = self.moment.truth.occupancy.get(voxel).map_or("n/a", |o| if *o == 1 { "occupied" } else { "free" });
+                let truth =
+                    self.moment.truth.occupancy.get(voxel).map_or("n/a", |o| if *o == 1 { "occupied" } else { "free" });
                 row(ui, "truth", truth.to_owned(), "What is really there");
             } else {
                 let a = self.moment.belief.cell(self.cell);
                 let column = picture::column_entropy(&self.column(self.moment), &a);
-                row(ui, "entropy", words::nats(column), "Of the column's voxels below 0.27 m and the class together, nats");
-                row(ui, "of the class", words::nats(dirichlet_entropy(&a)), "H of the class probabilities, 0 to ln 15 = 2.71 nats");
+                row(
+                    ui,
+                    "entropy",
+                    words::nats(column),
+                    "Of the column's voxels below 0.27 m and the class together, nats",
+                );
+                row(
+                    ui,
+                    "of the class",
+                    words::nats(dirichlet_entropy(&a)),
+                    "H of the class probabilities, 0 to ln 15 = 2.71 nats",
+                );
                 ui.end_row();
-                row(ui, "vacuity", words::probability(dirichlet_vacuity(&a)), "K / Σ a: 1 without evidence, towards 0 with much");
-                row(ui, "evidence", words::significant(f64::from(a.iter().sum::<f32>()), 3), "Sum of the Dirichlet's parameters, 15 at the start");
+                row(
+                    ui,
+                    "vacuity",
+                    words::probability(dirichlet_vacuity(&a)),
+                    "K / Σ a: 1 without evidence, towards 0 with much",
+                );
+                row(
+                    ui,
+                    "evidence",
+                    words::significant(f64::from(a.iter().sum::<f32>()), 3),
+                    "Sum of the Dirichlet's parameters, 15 at the start",
+                );
                 ui.end_row();
                 row(ui, "truth", self.true_class(), "The class of the tallest object above the cell");
             }
@@ -176,9 +208,14 @@ impl About<'_> {
 
     fn causes(&self, ui: &mut Ui, ask: &mut Vec<Command>) {
         heading(ui, "What changed it", "Observations and pushes that touched it; click one to go to its step");
-        let changes: Vec<Change> = self.session.moments.windows(2).filter_map(|pair| self.change(&pair[0], &pair[1])).collect();
+        let changes: Vec<Change> =
+            self.session.moments.windows(2).filter_map(|pair| self.change(&pair[0], &pair[1])).collect();
         if changes.is_empty() {
-            ui.weak(if self.session.steps() == 0 { "Nothing yet: no action was taken" } else { "No look or push has touched it" });
+            ui.weak(if self.session.steps() == 0 {
+                "Nothing yet: no action was taken"
+            } else {
+                "No look or push has touched it"
+            });
         }
         for change in changes {
             let text = format!("step {}: {}", change.step, change.causes.join(", "));
@@ -233,7 +270,7 @@ impl About<'_> {
             }
         }
         if let Some(prediction) = &outcome.prediction {
-            let place = prediction.window.cells(&self.grid).position(|cell| cell == self.cell);
+            let place = in_window(&prediction.window, &self.grid, self.cell);
             let change = place.and_then(|at| prediction.change.get(at)).copied().unwrap_or(0.0);
             if change >= WORTH_TELLING {
                 causes.push(format!("predicted change {}", words::probability(change)));
@@ -281,7 +318,8 @@ impl About<'_> {
                 );
                 painter.rect_filled(bar, 0.0, legend::ink(Colormap::Viridis.rgb(p)));
                 if self.moment.truth.occupancy.get(first + level) == Some(&1) {
-                    let mark = Rect::from_min_max(pos2(plot.right() + 3.0, bottom - each), pos2(plot.right() + 8.0, bottom));
+                    let mark =
+                        Rect::from_min_max(pos2(plot.right() + 3.0, bottom - each), pos2(plot.right() + 8.0, bottom));
                     painter.rect_filled(mark, 0.0, ui.visuals().strong_text_color());
                 }
                 let asked = self.voxel() == Some(first + level);
@@ -305,7 +343,8 @@ impl About<'_> {
         }
         if let Some(level) = over {
             let voxel = first + level;
-            let truth = self.moment.truth.occupancy.get(voxel).map_or("n/a", |o| if *o == 1 { "occupied" } else { "free" });
+            let truth =
+                self.moment.truth.occupancy.get(voxel).map_or("n/a", |o| if *o == 1 { "occupied" } else { "free" });
             let p = words::probability(beta_mean(self.moment.belief.voxel(voxel)));
             let z = self.grid.center(self.grid.voxel(voxel)).z;
             let text = format!("z {z:.3} m: occupied {p}, really {truth}");
@@ -334,7 +373,8 @@ impl About<'_> {
                 colour: legend::ink(colors::of_class(catalog, class)),
                 strong: truth == Some(class),
             };
-            spark::bar(ui, &bar, 112.0, 30.0).on_hover_text(format!("Dirichlet parameter {}", words::significant(f64::from(*a), 3)));
+            spark::bar(ui, &bar, 112.0, 30.0)
+                .on_hover_text(format!("Dirichlet parameter {}", words::significant(f64::from(*a), 3)));
         }
         let vacuity = words::probability(dirichlet_vacuity(&self.moment.belief.cell(self.cell)));
         ui.label(RichText::new(format!("vacuity {vacuity}, truth: {}", self.true_class())).small())

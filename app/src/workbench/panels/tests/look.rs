@@ -39,7 +39,8 @@ fn crowded() -> Model {
 #[test]
 #[ignore = "writes pictures; needs a wgpu adapter"]
 fn pictures() {
-    let out = std::env::var_os("NUDGE_PICTURES").map_or_else(|| std::env::temp_dir().join("nudge-panels"), PathBuf::from);
+    let out =
+        std::env::var_os("NUDGE_PICTURES").map_or_else(|| std::env::temp_dir().join("nudge-panels"), PathBuf::from);
     std::fs::create_dir_all(&out).expect("directory");
     let shots: [(&str, Show, [f32; 2], usize); 10] = [
         ("maps", maps::show, [520.0, 640.0], 8),
@@ -82,7 +83,10 @@ fn pictures() {
             model = stage.model;
             model.panels = panels::State::default();
             let steady = spent.iter().skip(4).copied().fold(f64::INFINITY, f64::min);
-            println!("{name} {theme}: first {:.2} ms, then {steady:.2} ms a frame", spent.iter().copied().fold(0.0, f64::max));
+            println!(
+                "{name} {theme}: first {:.2} ms, then {steady:.2} ms a frame",
+                spent.iter().copied().fold(0.0, f64::max)
+            );
         }
     }
 }

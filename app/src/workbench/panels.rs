@@ -14,6 +14,7 @@ pub mod push;
 pub mod why;
 
 mod arrows;
+mod facts;
 mod floor;
 mod legend;
 mod push_review;

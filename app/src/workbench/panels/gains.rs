@@ -1,5 +1,6 @@
 //! The gain of every view: one heat map per look-at target, and where the chosen view's gain comes from.
 
+use super::facts::{self, fact};
 use super::legend::{self, Bar};
 use super::{NO_EPISODE, Touched, empty, heading, spark, weighed, words};
 use crate::colors::Colormap;
@@ -219,24 +220,15 @@ impl<'a> HeatMap<'a> {
         };
         heading(ui, format!("View {}", view.id.0), "The view that was clicked");
         let at = view.position();
-        let rows = [
-            ("gain", words::nats(gain), "Information gain of this view alone"),
-            ("of the best", words::percent(gain / best), "Share of the best view's gain"),
-            ("camera at", place([at.x, at.y, at.z]), "x to the right, y into the shelf, z up"),
-            ("looks at", place(view.target), "The look-at target"),
-            (
-                "used",
-                if self.used.contains(&view.id) { "since the last push" } else { "not since the last push" }.to_owned(),
-                "A view is not looked from twice until a push has moved something",
-            ),
+        let used = if self.used.contains(&view.id) { "since the last push" } else { "not since the last push" };
+        let facts = [
+            fact("gain", words::nats(gain), "Information gain of this view alone"),
+            fact("of the best", words::percent(gain / best), "Share of the best view's gain"),
+            fact("camera at", place([at.x, at.y, at.z]), "x to the right, y into the shelf, z up"),
+            fact("looks at", place(view.target), "The look-at target"),
+            fact("used", used, "A view is not looked from twice until a push has moved something"),
         ];
-        egui::Grid::new("view numbers").num_columns(2).spacing([14.0, 2.0]).show(ui, |ui| {
-            for (name, value, hint) in rows {
-                ui.label(RichText::new(name).small()).on_hover_text(hint);
-                ui.label(words::figure(value)).on_hover_text(hint);
-                ui.end_row();
-            }
-        });
+        facts::show(ui, "view numbers", 1, &facts);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::arrows::{Look, arrow, ends, nearest, tag};
 use super::decision;
+use super::facts::{self, fact};
 use super::floor::{Drawn, FloorMap, Outlines, in_window};
 use super::legend::{self, Bar};
 use super::push_review::{self, Review};
@@ -218,28 +219,18 @@ impl Here<'_> {
         heading(ui, format!("Push {at}"), "The push that was clicked");
         let nats = |value: Option<f32>| value.map_or("not weighed".to_owned(), words::nats);
         let [x, y, _] = candidate.push.start;
-        let rows = [
-            ("value", nats(weighed::value(candidate, gamma)), "Gain + γ·Reg"),
-            ("gain", nats(candidate.gain), "Best single view under the predicted belief"),
-            ("Reg", nats(candidate.reg), "min(0, H(labels) − H(labels, predicted)): what it would blur"),
-            ("view", candidate.view.map_or("n/a".to_owned(), |view| view.0.to_string()), "The view with that gain"),
-            ("from", format!("x {}, y {} m", words::metres(x), words::metres(y)), "Where the tip starts"),
-            (
-                "way",
-                format!("{:.0} mm to {:.0}°", candidate.push.length_m * 1e3, candidate.push.direction_deg)
-                    .replace('-', "−"),
-                "Length and direction; 90° is into the shelf",
-            ),
+        let way = format!("{:.0} mm to {:.0}°", candidate.push.length_m * 1e3, candidate.push.direction_deg);
+        let view = candidate.view.map_or("n/a".to_owned(), |view| view.0.to_string());
+        let place = format!("x {}, y {} m", words::metres(x), words::metres(y));
+        let facts = [
+            fact("value", nats(weighed::value(candidate, gamma)), "Gain + γ·Reg"),
+            fact("gain", nats(candidate.gain), "Best single view under the predicted belief"),
+            fact("Reg", nats(candidate.reg), "min(0, H(labels) − H(labels, predicted)): what it would blur"),
+            fact("best view", view, "The view with that gain"),
+            fact("from", place, "Where the tip starts"),
+            fact("way", way.replace('-', "−"), "Length and direction; 90° is into the shelf"),
         ];
-        egui::Grid::new("push numbers").num_columns(4).spacing([14.0, 2.0]).show(ui, |ui| {
-            for pair in rows.chunks(2) {
-                for (name, value, hint) in pair {
-                    ui.label(RichText::new(*name).small()).on_hover_text(*hint);
-                    ui.label(words::figure(value)).on_hover_text(*hint);
-                }
-                ui.end_row();
-            }
-        });
+        facts::show(ui, "push numbers", 2, &facts);
         if let Some(rejection) = &candidate.rejection {
             ui.label(format!("Rejected: {}", words::rejection(rejection)));
         }

@@ -1,12 +1,13 @@
 //! What a push was predicted to do, and what it did.
 
+use super::facts::{self, fact};
 use super::{heading, words};
 use crate::workbench::session::{Moment, SessionId};
 use nudge_core::belief::PushPrediction;
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::grid::Grid;
 use nudge_core::world::TruthMap;
-use rerun::external::egui::{self, RichText, Ui};
+use rerun::external::egui::Ui;
 
 /// A floor cell whose predicted probability of change is above this is predicted to change.
 const CHANGES: f32 = 0.5;
@@ -83,35 +84,28 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
     } else {
         outcome.record.dropped.join(", ").replace('_', " ")
     };
-    let rows = [
-        ("objects moved", format!("{moved} of {}", record.scene.objects.len()), "Objects that moved by more than 2 mm"),
-        ("displacement", format!("{:.0} mm", total * 1e3), "Of all objects together"),
-        (
+    let predicted = review.predicted.map_or("n/a".to_owned(), |cells| cells.to_string());
+    let facts = [
+        fact(
+            "objects moved",
+            format!("{moved} of {}", record.scene.objects.len()),
+            "Objects that moved by more than 2 mm",
+        ),
+        fact("displacement", format!("{:.0} mm", total * 1e3), "Of all objects together"),
+        fact(
             "tool went",
             format!("{:.0} of {:.0} mm", pushed.pushed_m * 1e3, asked * 1e3),
             "How far the tip moved along the push",
         ),
-        ("blocked", if pushed.stalled { "yes" } else { "no" }.to_owned(), "Whether the tool jammed and gave up"),
-        ("dropped", dropped, "Objects that left the board"),
-        ("cells changed", review.changed.to_string(), "Floor cells in whose column something really changed"),
-        (
-            "predicted",
-            review.predicted.map_or("nothing was predicted".to_owned(), |cells| cells.to_string()),
-            "Floor cells with a predicted probability of change above 0.5",
-        ),
-        ("both", review.both.to_string(), "Cells that were predicted to change and did"),
-        ("precision", share(review.precision()), "Share of the cells predicted to change that did"),
-        ("recall", share(review.recall()), "Share of the cells that changed which were predicted to"),
+        fact("blocked", if pushed.stalled { "yes" } else { "no" }, "Whether the tool jammed and gave up"),
+        fact("dropped", dropped, "Objects that left the board"),
+        fact("cells changed", review.changed.to_string(), "Floor cells in whose column something really changed"),
+        fact("predicted", predicted, "Floor cells with a predicted probability of change above 0.5"),
+        fact("both", review.both.to_string(), "Cells that were predicted to change and did"),
+        fact("precision", share(review.precision()), "Share of the cells predicted to change that did"),
+        fact("recall", share(review.recall()), "Share of the cells that changed which were predicted to"),
     ];
-    egui::Grid::new("push review").num_columns(4).spacing([14.0, 2.0]).show(ui, |ui| {
-        for pair in rows.chunks(2) {
-            for (name, value, hint) in pair {
-                ui.label(RichText::new(*name).small()).on_hover_text(*hint);
-                ui.label(words::figure(value)).on_hover_text(*hint);
-            }
-            ui.end_row();
-        }
-    });
+    facts::show(ui, "push review", 2, &facts);
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Why a voxel or a floor cell is believed to be what it is: its numbers, their history, and what changed them.
 
+use super::facts::{self, fact};
 use super::floor::in_window;
 use super::maps::picked_cell;
 use super::spark::{self, Spark};
@@ -16,8 +17,8 @@ use nudge_core::plan::Action;
 use nudge_core::scene::{CLASS_COUNT, ClassId};
 use nudge_core::score::SCORED_HEIGHT_M;
 use rerun::external::egui::{
-    self, Align, Align2, Button, Grid as Rows, Label, Layout, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip,
-    Ui, WidgetInfo, WidgetType, pos2, vec2,
+    self, Align, Align2, Button, Label, Layout, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui,
+    WidgetInfo, WidgetType, pos2, vec2,
 };
 
 /// A predicted probability of change below this is not worth a line.
@@ -104,67 +105,45 @@ impl About<'_> {
     }
 
     fn numbers(&self, ui: &mut Ui) {
-        let row = |ui: &mut Ui, name: &str, value: String, hint: &str| {
-            ui.label(RichText::new(name).small()).on_hover_text(hint);
-            ui.label(words::figure(value)).on_hover_text(hint);
-        };
-        Rows::new("numbers").num_columns(4).spacing([14.0, 2.0]).show(ui, |ui| {
-            if let Some(voxel) = self.voxel() {
-                let a = self.moment.belief.voxel(voxel);
-                let p = beta_mean(a);
-                let number = |value: f32| words::significant(f64::from(value), 3);
-                row(ui, "occupied", words::probability(p), "Mean of the Beta, a_occ / (a_occ + a_free), 0 to 1");
-                row(
-                    ui,
-                    "Beta",
-                    format!("{}, {}", number(a[0]), number(a[1])),
-                    "Parameters a_occ and a_free, both 1 at the start",
-                );
-                ui.end_row();
-                row(
-                    ui,
+        let number = |value: f32| words::significant(f64::from(value), 3);
+        let facts = if let Some(voxel) = self.voxel() {
+            let a = self.moment.belief.voxel(voxel);
+            let p = beta_mean(a);
+            let beta = format!("{}, {}", number(a[0]), number(a[1]));
+            vec![
+                fact("occupied", words::probability(p), "Mean of the Beta, a_occ / (a_occ + a_free), 0 to 1"),
+                fact("Beta", beta, "Parameters a_occ and a_free, both 1 at the start"),
+                fact(
                     "variance",
                     number(beta_variance(a)),
                     "Of the Beta, what is not known about p: 1/12 at the start, less with evidence",
-                );
-                row(ui, "entropy", words::nats(bernoulli_entropy(p)), "H(p), 0 to ln 2 = 0.693 nats");
-                ui.end_row();
-                let truth =
-                    self.moment.truth.occupancy.get(voxel).map_or("n/a", |o| if *o == 1 { "occupied" } else { "free" });
-                row(ui, "truth", truth.to_owned(), "What is really there");
-            } else {
-                let a = self.moment.belief.cell(self.cell);
-                let column = picture::column_entropy(&self.column(self.moment), &a);
-                row(
-                    ui,
-                    "entropy",
-                    words::nats(column),
-                    "Of the column's voxels below 0.27 m and the class together, nats",
-                );
-                row(
-                    ui,
-                    "of the class",
-                    words::nats(dirichlet_entropy(&a)),
-                    "H of the class probabilities, 0 to ln 15 = 2.71 nats",
-                );
-                ui.end_row();
-                row(
-                    ui,
-                    "vacuity",
-                    words::probability(dirichlet_vacuity(&a)),
-                    "K / Σ a: 1 without evidence, towards 0 with much",
-                );
-                row(
-                    ui,
-                    "evidence",
-                    words::significant(f64::from(a.iter().sum::<f32>()), 3),
-                    "Sum of the Dirichlet's parameters, 15 at the start",
-                );
-                ui.end_row();
-                row(ui, "truth", self.true_class(), "The class of the tallest object above the cell");
-            }
-            ui.end_row();
-        });
+                ),
+                fact("entropy", words::nats(bernoulli_entropy(p)), "H(p), 0 to ln 2 = 0.693 nats"),
+                fact("truth", self.really(voxel), "What is really there"),
+            ]
+        } else {
+            let a = self.moment.belief.cell(self.cell);
+            let all = picture::column_entropy(&self.column(self.moment), &a);
+            let class = dirichlet_entropy(&a);
+            let evidence = number(a.iter().sum::<f32>());
+            vec![
+                fact("entropy", words::nats(all), "Of the column's voxels below 0.27 m and the class together, nats"),
+                fact("of the class", words::nats(class), "H of the class probabilities, 0 to ln 15 = 2.71 nats"),
+                fact("vacuity", number(dirichlet_vacuity(&a)), "K / Σ a: 1 without evidence, towards 0 with much"),
+                fact("evidence", evidence, "Σ a, the sum of the Dirichlet's parameters, 15 at the start"),
+                fact("truth", self.true_class(), "The class of the tallest object above the cell"),
+            ]
+        };
+        facts::show(ui, "why numbers", 2, &facts);
+    }
+
+    /// What is really in a voxel.
+    fn really(&self, voxel: usize) -> &'static str {
+        match self.moment.truth.occupancy.get(voxel) {
+            Some(1) => "occupied",
+            Some(_) => "free",
+            None => "n/a",
+        }
     }
 
     /// The voxels of the column in the scored volume.
@@ -343,8 +322,7 @@ impl About<'_> {
         }
         if let Some(level) = over {
             let voxel = first + level;
-            let truth =
-                self.moment.truth.occupancy.get(voxel).map_or("n/a", |o| if *o == 1 { "occupied" } else { "free" });
+            let truth = self.really(voxel);
             let p = words::probability(beta_mean(self.moment.belief.voxel(voxel)));
             let z = self.grid.center(self.grid.voxel(voxel)).z;
             let text = format!("z {z:.3} m: occupied {p}, really {truth}");

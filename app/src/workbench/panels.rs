@@ -14,6 +14,7 @@ pub mod push;
 pub mod why;
 
 mod arrows;
+mod causes;
 mod facts;
 mod floor;
 mod legend;

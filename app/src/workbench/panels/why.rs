@@ -1,7 +1,7 @@
 //! Why a voxel or a floor cell is believed to be what it is: its numbers, their history, and what changed them.
 
+use super::causes;
 use super::facts::{self, fact};
-use super::floor::in_window;
 use super::maps::picked_cell;
 use super::spark::{self, Spark};
 use super::{NO_EPISODE, empty, heading, legend, words};
@@ -11,18 +11,13 @@ use crate::workbench::command::Command;
 use crate::workbench::model::{Model, Picked};
 use crate::workbench::session::{Moment, Session};
 use nudge_core::belief::{bernoulli_entropy, beta_mean, beta_variance, dirichlet_entropy, dirichlet_vacuity};
-use nudge_core::camera::UNOBSERVED;
 use nudge_core::grid::Grid;
-use nudge_core::plan::Action;
-use nudge_core::scene::{CLASS_COUNT, ClassId};
+use nudge_core::scene::ClassId;
 use nudge_core::score::SCORED_HEIGHT_M;
 use rerun::external::egui::{
     self, Align, Align2, Button, Label, Layout, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui,
     WidgetInfo, WidgetType, pos2, vec2,
 };
-
-/// A predicted probability of change below this is not worth a line.
-const WORTH_TELLING: f32 = 0.01;
 
 /// What the panel remembers: nothing so far.
 #[derive(Default)]
@@ -69,14 +64,6 @@ struct About<'a> {
     cursor: usize,
     picked: Picked,
     cell: usize,
-}
-
-/// A step that changed what was picked, with its causes.
-struct Change {
-    step: usize,
-    causes: Vec<String>,
-    /// What it made of the number that the history shows.
-    from_to: [String; 2],
 }
 
 impl About<'_> {
@@ -178,7 +165,7 @@ impl About<'_> {
             let entropy = of(&|moment| bernoulli_entropy(beta_mean(moment.belief.voxel(voxel))));
             line("entropy", &entropy, [0.0, std::f32::consts::LN_2], pink, &words::nats);
         } else {
-            let certainty = of(&|moment| likeliest(&moment.belief.cell(self.cell)).1);
+            let certainty = of(&|moment| causes::certainty(moment, self.cell));
             line("certainty", &certainty, [0.0, 1.0], green, &words::probability);
             let entropy = of(&|moment| picture::column_entropy(&self.column(moment), &moment.belief.cell(self.cell)));
             line("entropy", &entropy, picture::entropy_range(&self.grid), pink, &words::nats);
@@ -187,8 +174,7 @@ impl About<'_> {
 
     fn causes(&self, ui: &mut Ui, ask: &mut Vec<Command>) {
         heading(ui, "What changed it", "Observations and pushes that touched it; click one to go to its step");
-        let changes: Vec<Change> =
-            self.session.moments.windows(2).filter_map(|pair| self.change(&pair[0], &pair[1])).collect();
+        let changes = causes::of(self.session, self.picked);
         if changes.is_empty() {
             ui.weak(if self.session.steps() == 0 {
                 "Nothing yet: no action was taken"
@@ -199,7 +185,8 @@ impl About<'_> {
         for change in changes {
             let text = format!("step {}: {}", change.step, change.causes.join(", "));
             ui.horizontal(|ui| {
-                let numbers = format!("{} → {}", change.from_to[0], change.from_to[1]);
+                let [from, to] = change.from_to.map(words::probability);
+                let numbers = format!("{from} → {to}");
                 let ink = ui.visuals().weak_text_color();
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                     ui.add(Label::new(words::figure(numbers).color(ink)).selectable(false));
@@ -212,64 +199,6 @@ impl About<'_> {
                 });
             });
         }
-    }
-
-    /// What a step did to what was picked; `None` if it did not touch it.
-    fn change(&self, before: &Moment, after: &Moment) -> Option<Change> {
-        let outcome = after.outcome.as_ref()?;
-        let mut causes = Vec::new();
-        if let (Some(observation), Action::Look { view }) = (&outcome.observation, outcome.record.action) {
-            let from = format!("from view {}", view.0);
-            match self.voxel() {
-                Some(voxel) if observation.free.contains(voxel) => causes.push(format!("seen free {from}")),
-                Some(voxel) if observation.occupied.contains(voxel) => causes.push(format!("seen occupied {from}")),
-                Some(_) => {}
-                None => {
-                    let count = |set: &nudge_core::grid::VoxelSet| {
-                        self.grid.column(self.cell).filter(|voxel| set.contains(*voxel)).count()
-                    };
-                    let (free, occupied) = (count(&observation.free), count(&observation.occupied));
-                    if free + occupied > 0 {
-                        causes.push(format!("{free} voxels seen free, {occupied} occupied {from}"));
-                    }
-                }
-            }
-            let label = observation.labels.get(self.cell).copied().unwrap_or(UNOBSERVED);
-            if usize::from(label) < CLASS_COUNT && self.voxel().is_none() {
-                causes.push(format!("labelled {}", colors::class_title(&self.session.setup.catalog, ClassId(label))));
-            }
-        }
-        if let Some(push) = &outcome.swept {
-            let swept = match self.voxel() {
-                Some(voxel) => push.swept.contains(voxel),
-                None => self.grid.column(self.cell).any(|voxel| push.swept.contains(voxel)),
-            };
-            if swept {
-                causes.push("push swept it".to_owned());
-            }
-        }
-        if let Some(prediction) = &outcome.prediction {
-            let place = in_window(&prediction.window, &self.grid, self.cell);
-            let change = place.and_then(|at| prediction.change.get(at)).copied().unwrap_or(0.0);
-            if change >= WORTH_TELLING {
-                causes.push(format!("predicted change {}", words::probability(change)));
-            }
-        }
-        let labels = [before, after].map(|moment| moment.truth.labels.get(self.cell).copied());
-        if labels[0] != labels[1]
-            && let Some(label) = labels[1]
-        {
-            let name = colors::class_title(&self.session.setup.catalog, ClassId(label));
-            causes.push(format!("what stands there became {name}"));
-        }
-        if causes.is_empty() {
-            return None;
-        }
-        let number = |moment: &Moment| match self.voxel() {
-            Some(voxel) => words::probability(beta_mean(moment.belief.voxel(voxel))),
-            None => words::probability(likeliest(&moment.belief.cell(self.cell)).1),
-        };
-        Some(Change { step: after.step, causes, from_to: [number(before), number(after)] })
     }
 
     /// The probabilities up the column, the truth beside them.
@@ -358,10 +287,4 @@ impl About<'_> {
         ui.label(RichText::new(format!("vacuity {vacuity}, truth: {}", self.true_class())).small())
             .on_hover_text("Vacuity K / Σ a: 1 without evidence, towards 0 with much");
     }
-}
-
-/// The likeliest class of a Dirichlet (the first of equals) and its probability.
-fn likeliest(a: &[f32; CLASS_COUNT]) -> (usize, f32) {
-    let best = (1..CLASS_COUNT).fold(0, |best, k| if a[k] > a[best] { k } else { best });
-    (best, a[best] / a.iter().sum::<f32>())
 }

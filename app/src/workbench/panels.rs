@@ -37,9 +37,7 @@ use rerun::external::egui;
 pub struct State {
     maps: maps::State,
     camera: camera::State,
-    curves: curves::State,
     decision: decision::State,
-    why: why::State,
     gains: gains::State,
     push: push::State,
     compare: compare::State,

@@ -44,8 +44,8 @@ pub fn show(ui: &mut Ui, model: &mut Model, _ask: &mut Vec<Command>) {
 fn draw(state: &mut State, ui: &mut Ui, model: &Model) {
     let Some(session) = model.session() else { return empty(ui, NO_EPISODE) };
     let until = model.cursor.min(session.steps());
-    let looks = session.moments[..=until].iter().rev();
-    let found = looks.filter_map(|moment| Some((moment.step, moment.outcome.as_ref()?.image.as_ref()?))).next();
+    let mut moments = session.moments[..=until].iter().rev();
+    let found = moments.find_map(|moment| Some((moment.step, moment.outcome.as_ref()?.image.as_ref()?)));
     let Some((step, image)) = found else {
         return empty(ui, "No image yet: decide, or choose a view to look from");
     };

@@ -12,10 +12,6 @@ use rerun::external::egui::{
     self, Color32, CursorIcon, Rangef, RichText, Sense, Stroke, TextStyle, Ui, WidgetInfo, WidgetType, vec2,
 };
 
-/// What the panel remembers: nothing so far.
-#[derive(Default)]
-pub struct State;
-
 /// The scores between 0 and 1 that are drawn.
 const SHARES: [&str; 3] = ["occupancy_iou", "occupied_iou", "semantic_miou"];
 const ENTROPY: &str = "entropy_nats";

@@ -102,7 +102,7 @@ fn controls(ui: &mut Ui, grid: &Grid, slice_m: Option<f32>, drawn: usize, cursor
             chosen = on.then(|| (0.06_f32).min(height));
         }
         if let Some(at) = &mut chosen {
-            *at = at.clamp(0.0, height);
+            *at = if at.is_finite() { at.clamp(0.0, height) } else { 0.0 };
             let slider =
                 Slider::new(at, 0.0..=height).custom_formatter(|m, _| format!("{m:.3} m")).text("Slice height");
             ui.add(slider).on_hover_text(format!("Height above the board, 0 to {height:.2} m"));

@@ -3,7 +3,7 @@
 use super::arrows::{Look, arrow, ends, nearest, tag};
 use super::decision;
 use super::facts::{self, fact};
-use super::floor::{Drawn, FloorMap, Outlines, in_window};
+use super::floor::{Drawn, FloorMap, Line, Outlines, in_window};
 use super::legend::{self, Bar};
 use super::push_review::{self, Review};
 use super::table::Sort;
@@ -273,7 +273,7 @@ impl Here<'_> {
         let outlines = state.outlines.of(&self.session.moment(self.step).bodies);
         let gap = 10.0;
         let width = (0.5 * (ui.available_width() - gap)).floor().clamp(40.0, 420.0);
-        let mut one = |ui: &mut Ui, title: &str, hint: &str, picture: Option<&TextureHandle>, outlines: &[_]| {
+        let mut one = |ui: &mut Ui, title: &str, hint: &str, picture: Option<&TextureHandle>, outlines: &[Line]| {
             ui.vertical(|ui| {
                 ui.set_width(width);
                 heading(ui, title, hint);

@@ -19,10 +19,6 @@ use rerun::external::egui::{
     WidgetInfo, WidgetType, pos2, vec2,
 };
 
-/// What the panel remembers: nothing so far.
-#[derive(Default)]
-pub struct State;
-
 /// Draws the numbers, the history and the causes of what was picked.
 pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     let Some(session) = model.session() else { return empty(ui, NO_EPISODE) };

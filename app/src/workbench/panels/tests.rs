@@ -44,6 +44,17 @@ fn has(harness: &Harness<'_, Stage>, text: &str) -> bool {
     harness.query_all_by_label_contains(text).next().is_some()
 }
 
+/// A click at a place, after the pointer went there.
+fn click_at(harness: &mut Harness<'_, Stage>, at: egui::Pos2) {
+    harness.hover_at(at);
+    harness.run_steps(1);
+    for pressed in [true, false] {
+        let modifiers = egui::Modifiers::NONE;
+        harness.event(egui::Event::PointerButton { pos: at, button: egui::PointerButton::Primary, pressed, modifiers });
+    }
+    harness.run_steps(3);
+}
+
 /// The last thing asked for, if `is` takes it.
 fn asked<T>(harness: &Harness<'_, Stage>, is: impl Fn(&Command) -> Option<T>) -> Option<T> {
     harness.state().asked.iter().rev().find_map(is)
@@ -119,9 +130,7 @@ fn a_click_on_a_map_asks_about_its_cell() {
     }
     let map = harness.get_by_label("Map of truth").rect();
     let at = map.left_bottom() + egui::vec2(0.25 * map.width(), -0.5);
-    harness.drag_at(at);
-    harness.drop_at(at);
-    harness.run_steps(2);
+    click_at(&mut harness, at);
     let cell = asked(&harness, |command| match command {
         Command::Pick(Some(Picked::Cell(cell))) => Some(*cell),
         _ => None,
@@ -169,9 +178,7 @@ fn a_click_on_the_curves_moves_the_cursor() {
     let mut harness = harness(curves::show, fixture::model());
     let plot = harness.get_by_label("Scores over the steps").rect();
     let at = plot.center();
-    harness.drag_at(at);
-    harness.drop_at(at);
-    harness.run_steps(2);
+    click_at(&mut harness, at);
     let step = asked(&harness, |command| match command {
         Command::GoTo(step) => Some(*step),
         _ => None,
@@ -192,9 +199,7 @@ fn the_decision_says_what_why_and_lets_a_person_do_something_else() {
     harness.hover_at(egui::pos2(1.0, 1.0));
     harness.run_steps(2);
     assert_eq!(harness.state().model.hovered, Hovered::Nothing);
-    harness.drag_at(rows[1].center());
-    harness.drop_at(rows[1].center());
-    harness.run_steps(2);
+    click_at(&mut harness, rows[1].center());
     assert_eq!(harness.state().model.view, Some(over));
     harness.get_by_label("Look from here").click();
     harness.run_steps(2);
@@ -282,9 +287,7 @@ fn a_click_on_a_heat_map_explains_a_view() {
     harness.run_steps(2);
     // The lowest left position of the second target is the second view.
     assert_eq!(harness.state().model.hovered, Hovered::View(ViewId(1)));
-    harness.drag_at(at);
-    harness.drop_at(at);
-    harness.run_steps(2);
+    click_at(&mut harness, at);
     assert!(asked(&harness, |command| matches!(command, Command::GainOf(ViewId(1))).then_some(())).is_some());
     fixture::answer(&mut harness.state_mut().model);
     harness.run_steps(2);
@@ -297,9 +300,7 @@ fn a_push_is_predicted_and_then_judged() {
     model.cursor = 3;
     let mut harness = harness(push::show, model);
     let row = harness.query_all_by_label_contains(", value ").next().expect("a feasible push").rect();
-    harness.drag_at(row.center());
-    harness.drop_at(row.center());
-    harness.run_steps(2);
+    click_at(&mut harness, row.center());
     assert!(harness.state().model.candidate.is_some());
     assert!(asked(&harness, |command| matches!(command, Command::Preview(_)).then_some(())).is_some());
     let model = &mut harness.state_mut().model;

@@ -2,9 +2,8 @@
 
 use super::derive::Derived;
 use super::half_belief::HalfBelief;
-use super::model::{Model, Preview};
-use super::session::{Moment, Session, SessionId, Setup};
-use crate::workbench::session::Activity;
+use super::model::{GainSource, Model, Preview};
+use super::session::{Activity, Moment, Session, SessionId, Setup};
 use nudge_core::belief::{BeliefUpdate, Classical, SweptPush};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
@@ -26,7 +25,9 @@ pub struct Played {
 
 /// How an episode is played.
 pub struct Script {
+    /// On which scene.
     pub scene: Scene,
+    /// With which policy, belief, seed and budget.
     pub config: EpisodeConfig,
     /// Number of actions done.
     pub steps: usize,
@@ -167,7 +168,7 @@ pub fn answer(model: &mut Model) {
     });
     let source = model.view.map(|view| {
         let nats = gain_per_voxel(&GainField::new(&belief), &session.setup.views, view, RayDensity::FULL);
-        super::model::GainSource { of: (session.id, step), view, nats: Arc::new(nats) }
+        GainSource { of: (session.id, step), view, nats: Arc::new(nats) }
     });
     model.preview = preview;
     model.gain_source = source;

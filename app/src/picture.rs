@@ -9,8 +9,8 @@ mod light;
 mod stage;
 
 pub use floor::{
-    CellError, FloorPlan, believed_class, cell_entropy, cell_errors, entropy_range, outlines, paint, paint_certainty,
-    paint_entropy, paint_errors, paint_labels, paint_semantics,
+    CellError, FloorPlan, believed_class, cell_entropy, cell_error, cell_errors, column_entropy, entropy_range,
+    outlines, paint, paint_certainty, paint_entropy, paint_errors, paint_labels, paint_semantics, semantics_rgb,
 };
 pub use image::RgbImage;
 pub use light::{Eye, Item, Projection, render};

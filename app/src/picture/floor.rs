@@ -51,13 +51,23 @@ pub fn believed_class(belief: &Belief, cell: usize) -> Option<ClassId> {
 
 /// The semantic belief: the likeliest class's colour, paler where it is less certain; palest where nothing is known.
 pub fn paint_semantics(belief: &Belief, catalog: &Catalog) -> RgbImage {
-    paint(&belief.grid, |cell| match believed_class(belief, cell) {
-        None => colors::UNKNOWN_RGB,
-        Some(class) => {
-            let certainty = belief.likeliest(cell).1;
+    paint(&belief.grid, |cell| semantics_rgb(&belief.semantics[cell], catalog))
+}
+
+/// The colour of a cell in [`paint_semantics`], by its Dirichlet parameters.
+pub fn semantics_rgb(parameters: &[f32; CLASS_COUNT], catalog: &Catalog) -> Rgb {
+    match believed(parameters) {
+        (_, certainty) if certainty.is_nan() || certainty <= UNKNOWN_BELOW => colors::UNKNOWN_RGB,
+        (class, certainty) => {
             colors::mix(colors::UNKNOWN_RGB, colors::of_class(catalog, class), (0.4 + 0.6 * certainty).min(1.0))
         }
-    })
+    }
+}
+
+/// The likeliest class of a Dirichlet (the first of equals) and its probability.
+fn believed(parameters: &[f32; CLASS_COUNT]) -> (ClassId, f32) {
+    let best = (1..CLASS_COUNT).fold(0, |best, k| if parameters[k] > parameters[best] { k } else { best });
+    (ClassId(best as u8), parameters[best] / parameters.iter().sum::<f32>())
 }
 
 /// The likeliest class's probability (viridis).
@@ -74,13 +84,14 @@ pub fn paint_labels(grid: &Grid, labels: &[u8], catalog: &Catalog) -> RgbImage {
 /// the map's entropy.
 pub fn cell_entropy(belief: &Belief) -> Vec<f32> {
     let levels = belief.grid.levels_below(SCORED_HEIGHT_M);
-    (0..belief.grid.cell_count())
-        .map(|cell| {
-            let column = &belief.occupancy[belief.grid.column(cell)][..levels];
-            let voxels: f32 = column.iter().map(|a| belief::bernoulli_entropy(belief::beta_mean(*a))).sum();
-            voxels + belief::dirichlet_entropy(&belief.semantics[cell])
-        })
-        .collect()
+    let of_cell = |cell| column_entropy(&belief.occupancy[belief.grid.column(cell)][..levels], &belief.semantics[cell]);
+    (0..belief.grid.cell_count()).map(of_cell).collect()
+}
+
+/// Entropy over one floor cell, nats: the voxels of its column in the scored volume and its class.
+pub fn column_entropy(column: &[[f32; 2]], class: &[f32; CLASS_COUNT]) -> f32 {
+    let voxels: f32 = column.iter().map(|a| belief::bernoulli_entropy(belief::beta_mean(*a))).sum();
+    voxels + belief::dirichlet_entropy(class)
 }
 
 /// From nothing open to nothing known: the scale of [`cell_entropy`], nats.
@@ -138,18 +149,18 @@ impl CellError {
 
 /// The semantic error of every floor cell.
 pub fn cell_errors(belief: &Belief, truth: &TruthMap) -> Vec<CellError> {
-    truth
-        .labels
-        .iter()
-        .enumerate()
-        .map(|(cell, &label)| match (believed_class(belief, cell), ClassId(label)) {
-            (None, BACKGROUND) => CellError::Unknown,
-            (Some(believed), truth) if believed == truth => CellError::Right,
-            (None | Some(BACKGROUND), _) => CellError::Missed,
-            (Some(_), BACKGROUND) => CellError::Hallucinated,
-            _ => CellError::Confused,
-        })
-        .collect()
+    (0..truth.labels.len()).map(|cell| cell_error(belief, truth, cell)).collect()
+}
+
+/// The semantic error of one floor cell.
+pub fn cell_error(belief: &Belief, truth: &TruthMap, cell: usize) -> CellError {
+    match (believed_class(belief, cell), ClassId(truth.labels[cell])) {
+        (None, BACKGROUND) => CellError::Unknown,
+        (Some(believed), truth) if believed == truth => CellError::Right,
+        (None | Some(BACKGROUND), _) => CellError::Missed,
+        (Some(_), BACKGROUND) => CellError::Hallucinated,
+        _ => CellError::Confused,
+    }
 }
 
 /// [`cell_errors`] in their colours.

@@ -54,7 +54,7 @@ pub fn line(record: &StepRecord) -> String {
 }
 
 /// An action in words.
-fn action(action: &Action) -> String {
+pub(crate) fn action(action: &Action) -> String {
     match action {
         Action::Look { view } => format!("look from view {}", view.0),
         Action::Push(push) => format!("push {:.0} mm towards {:.0}°", push.length_m * 1e3, push.direction_deg),
@@ -62,7 +62,7 @@ fn action(action: &Action) -> String {
 }
 
 /// A reason in words.
-fn reason(reason: Reason) -> &'static str {
+pub(crate) fn reason(reason: Reason) -> &'static str {
     match reason {
         Reason::LookTellsMore => "looking tells more",
         Reason::PushTellsMore => "pushing tells more",
@@ -179,13 +179,13 @@ fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
     page.push('\n');
 }
 
-fn capital(text: &str) -> String {
+pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// A whole number with its thousands apart.
-fn thousands(number: f64) -> String {
+pub(crate) fn thousands(number: f64) -> String {
     let digits = format!("{:.0}", number.max(0.0));
     let mut text = String::new();
     for (at, digit) in digits.chars().enumerate() {

@@ -3,6 +3,7 @@
 
 use super::author::Author;
 use super::derive::Derived;
+use super::panels;
 use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
 use nudge_core::belief::PushPrediction;
@@ -241,6 +242,8 @@ pub struct Model {
     pub author: Author,
     /// Messages that fade.
     pub toasts: Toasts,
+    /// What the panels remember from frame to frame.
+    pub panels: panels::State,
 }
 
 impl Model {

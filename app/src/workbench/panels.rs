@@ -1,4 +1,87 @@
 //! The panels: functions of the model that draw themselves and return commands.
 //!
 //! Every panel is `show(ui, model, ask)`: it reads the model, writes only what belongs to looking (what the pointer is
-//! over, which row is chosen), and pushes onto `ask` what shall be done.
+//! over, which row is chosen), and pushes onto `ask` what shall be done. What a panel remembers from frame to frame
+//! (textures, the order of a table) is its `State`, kept in [`State`] by the model.
+
+pub mod camera;
+pub mod compare;
+pub mod curves;
+pub mod decision;
+pub mod gains;
+pub mod maps;
+pub mod push;
+pub mod why;
+
+mod arrows;
+mod causes;
+mod facts;
+mod floor;
+mod legend;
+mod push_review;
+mod spark;
+mod table;
+mod textures;
+mod weighed;
+mod words;
+
+#[cfg(test)]
+mod tests;
+
+use super::model::{Hovered, Model};
+use nudge_core::camera::ViewId;
+use rerun::external::egui;
+
+/// What the panels remember from frame to frame.
+#[derive(Default)]
+pub struct State {
+    maps: maps::State,
+    camera: camera::State,
+    decision: decision::State,
+    gains: gains::State,
+    push: push::State,
+    compare: compare::State,
+}
+
+/// What a person did in a panel that is only about looking; it goes into the model once the panel is drawn.
+#[derive(Default)]
+struct Touched {
+    /// What the pointer is over.
+    over: Option<Hovered>,
+    /// A view that was chosen.
+    view: Option<ViewId>,
+    /// A push candidate that was chosen.
+    candidate: Option<usize>,
+}
+
+impl Touched {
+    /// Writes it into the model. `hovering` is whether the panel had put something under the pointer before: only then
+    /// is it the panel's to take that back.
+    fn apply(self, model: &mut Model, hovering: &mut bool) {
+        if let Some(over) = self.over {
+            model.hovered = over;
+        } else if *hovering {
+            model.hovered = Hovered::Nothing;
+        }
+        *hovering = self.over.is_some();
+        model.view = self.view.or(model.view);
+        model.candidate = self.candidate.or(model.candidate);
+    }
+}
+
+/// What a panel says that has nothing to show, with what to do next.
+fn empty(ui: &mut egui::Ui, text: &str) {
+    ui.vertical_centered(|ui| {
+        ui.add_space((0.35 * ui.available_height()).clamp(8.0, 120.0));
+        ui.weak(text);
+    });
+}
+
+/// The heading of a part of a panel; the tooltip says what it is.
+fn heading(ui: &mut egui::Ui, title: impl Into<String>, hint: &str) -> egui::Response {
+    let heading = ui.label(egui::RichText::new(title).strong());
+    if hint.is_empty() { heading } else { heading.on_hover_text(hint) }
+}
+
+/// The empty state of every panel without an episode.
+const NO_EPISODE: &str = "Open a scene, or drop one here";

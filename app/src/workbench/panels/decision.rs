@@ -1,0 +1,256 @@
+//! What is weighed at the cursor: looking against pushing, the verdict with its reason, and the best of both.
+
+use super::table::{self, Sort};
+use super::weighed::{self, Listed};
+use super::{NO_EPISODE, Touched, empty, heading, spark, words};
+use crate::colors::Colormap;
+use crate::workbench::command::Command;
+use crate::workbench::model::{Hovered, Model};
+use crate::workbench::session::{Activity, Session};
+use nudge_core::camera::ViewId;
+use nudge_core::plan::{Action, Decision, Reason};
+use rerun::external::egui::{self, Button, RichText, Ui};
+
+/// What the panel remembers.
+pub struct State {
+    views: Sort,
+    pushes: Sort,
+    /// Whether the rejected pushes are listed too.
+    rejected: bool,
+    hovering: bool,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self { views: Sort::falling(1), pushes: Sort::falling(1), rejected: false, hovering: false }
+    }
+}
+
+/// Draws the decision.
+pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+    let mut state = std::mem::take(&mut model.panels.decision);
+    let touched = draw(&mut state, ui, model, ask);
+    touched.apply(model, &mut state.hovering);
+    model.panels.decision = state;
+}
+
+fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
+    let mut touched = Touched::default();
+    let Some(session) = model.session() else {
+        empty(ui, NO_EPISODE);
+        return touched;
+    };
+    let Some(decision) = session.decision_after(model.cursor) else {
+        nothing(ui, session);
+        return touched;
+    };
+    let gamma = session.record.config.planner.gamma;
+    egui::ScrollArea::vertical().id_salt("decision").auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 4.0;
+        header(ui, session, model.cursor);
+        verdict(ui, decision, gamma);
+        ui.add_space(4.0);
+        views(state, ui, model, session, decision, &mut touched, ask);
+        ui.add_space(4.0);
+        pushes(state, ui, model, session, decision, &mut touched, ask);
+    });
+    touched
+}
+
+fn nothing(ui: &mut Ui, session: &Session) {
+    let text = match session.activity {
+        Activity::Deciding | Activity::Running => "Weighing views and pushes",
+        _ if session.is_finished() => "The budget is used up: step back to see what was weighed",
+        _ => "Nothing weighed yet: decide, to see what the policy would do",
+    };
+    empty(ui, text);
+}
+
+/// Which step it is and whether it is done.
+fn header(ui: &mut Ui, session: &Session, cursor: usize) {
+    let step = cursor.min(session.steps()) + 1;
+    let done = step <= session.steps();
+    ui.horizontal(|ui| {
+        heading(ui, format!("Step {step} of {}", session.record.config.budget), "");
+        ui.weak(if done { "done" } else { "pending" });
+    });
+}
+
+/// Looking against pushing, as bars on one scale, and what follows.
+fn verdict(ui: &mut Ui, decision: &Decision, gamma: f32) {
+    let (look, push) = (decision.igv, decision.igm + gamma * decision.reg);
+    let weighed = decision.best_push.is_some() && decision.igm != 0.0;
+    let scale = look.max(decision.igm).max(1e-6);
+    let looks = matches!(decision.action, Action::Look { .. });
+    let bar = |ui: &mut Ui, name: &str, value: f32, shade: f32, strong: bool, hint: &str| {
+        let bar = spark::Bar {
+            name: name.to_owned(),
+            share: value.abs() / scale,
+            value: words::nats(value),
+            colour: super::legend::ink(Colormap::Cividis.rgb(shade)),
+            strong,
+        };
+        spark::bar(ui, &bar, 74.0, 72.0).on_hover_text(hint);
+    };
+    let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsMore);
+    bar(ui, "Look: IGV", look, 0.85, ruled && looks, "IGV: information gain of the best two views together, nats");
+    if weighed {
+        bar(ui, "Push: IGM", decision.igm, 0.5, ruled && !looks, "IGM: best single view after the best push, nats");
+        let reg = gamma * decision.reg;
+        let hint = "What the push would blur, at most 0: Reg = min(0, H(labels) − H(labels, predicted))";
+        bar(ui, "γ·Reg", reg, 0.1, false, hint);
+        let gap = look - push;
+        let text = format!("IGV − (IGM + γ·Reg) = {}", words::nats(gap));
+        ui.label(RichText::new(text).small()).on_hover_text("The rule looks if this is above 0, and else pushes");
+    } else {
+        ui.label(RichText::new("No push was weighed").small().weak());
+    }
+    ui.add_space(2.0);
+    let what = words::capital(&words::action(&decision.action));
+    ui.label(RichText::new(what).strong().heading().size(15.0));
+    ui.label(format!("because {}", because(decision.reason)));
+}
+
+/// A reason as the end of a sentence.
+fn because(reason: Reason) -> String {
+    match reason {
+        Reason::LookTellsMore | Reason::PushTellsMore | Reason::MapComplete => words::reason(reason).to_owned(),
+        Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
+        Reason::TooEarly => "nothing is pushed in the first three steps".to_owned(),
+        Reason::LastStep => "nothing is pushed in the last step".to_owned(),
+        Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
+        Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),
+        Reason::NoCandidate => "no push is feasible".to_owned(),
+        Reason::Schedule => "the policy's schedule says so".to_owned(),
+        Reason::Manual => "it was chosen by hand".to_owned(),
+    }
+}
+
+fn views(
+    state: &mut State,
+    ui: &mut Ui,
+    model: &Model,
+    session: &Session,
+    decision: &Decision,
+    touched: &mut Touched,
+    ask: &mut Vec<Command>,
+) {
+    heading(ui, "Best views", "The ten views with the largest gain under the belief before the step");
+    if decision.gains.is_empty() {
+        ui.weak("This policy weighs no views");
+    } else {
+        let used = weighed::used_views(&session.record, model.cursor);
+        let rows = weighed::view_rows(decision, &session.setup.views, &used, model.view);
+        let table = table::show(ui, "views", &weighed::VIEW_COLUMNS, rows, &mut state.views, 220.0);
+        if let Some(view) = table.over {
+            touched.over = Some(Hovered::View(ViewId(view as u16)));
+        }
+        if let Some(view) = table.clicked.map(|view| ViewId(view as u16)) {
+            touched.view = Some(view);
+            ask.push(Command::GainOf(view));
+        }
+    }
+    let chosen = model.view.filter(|view| session.setup.views.view(*view).is_some());
+    let title = chosen.map_or("Look from here".to_owned(), |view| format!("Look from here: view {}", view.0));
+    let missing = chosen.is_none().then_some("Choose a view first");
+    if do_instead(ui, session, model.cursor, "Look from here", &title, missing)
+        && let Some(view) = chosen
+    {
+        ask.push(Command::DoInstead(Action::Look { view }));
+    }
+}
+
+fn pushes(
+    state: &mut State,
+    ui: &mut Ui,
+    model: &Model,
+    session: &Session,
+    decision: &Decision,
+    touched: &mut Touched,
+    ask: &mut Vec<Command>,
+) {
+    if decision.candidates.is_empty() {
+        return;
+    }
+    let table = push_table(ui, &mut state.pushes, &mut state.rejected, model, session, decision, 220.0);
+    apply_push(table, decision, touched, ask);
+    push_button(ui, session, model, decision, ask);
+}
+
+/// The pushes as a table, rejected ones on demand.
+pub fn push_table(
+    ui: &mut Ui,
+    sort: &mut Sort,
+    rejected: &mut bool,
+    model: &Model,
+    session: &Session,
+    decision: &Decision,
+    height: f32,
+) -> table::Touched {
+    let (all, refused) = (
+        decision.candidates.len(),
+        decision.candidates.iter().filter(|candidate| candidate.rejection.is_some()).count(),
+    );
+    ui.horizontal(|ui| {
+        heading(ui, "Best pushes", "The ten feasible pushes with the largest value, gain + γ·Reg");
+        ui.label(RichText::new(format!("{} of {all} drawn are feasible", all - refused)).small().weak());
+    });
+    let gamma = session.record.config.planner.gamma;
+    let listed = if *rejected { Listed::All } else { Listed::Best };
+    let rows = weighed::push_rows(decision, gamma, listed, model.candidate);
+    let touched = if rows.is_empty() {
+        ui.weak("No push is feasible here");
+        table::Touched::default()
+    } else {
+        table::show(ui, "pushes", &weighed::PUSH_COLUMNS, rows, sort, height)
+    };
+    if refused > 0 {
+        ui.checkbox(rejected, RichText::new(format!("List all, with {refused} rejected")).small())
+            .on_hover_text("Rejected pushes are grey; their tooltip says why");
+    }
+    touched
+}
+
+/// What pointing at or clicking a push leads to.
+pub fn apply_push(table: table::Touched, decision: &Decision, touched: &mut Touched, ask: &mut Vec<Command>) {
+    let push = |at: usize| decision.candidates.get(at).map(|candidate| candidate.push);
+    if let Some(push) = table.over.and_then(push) {
+        touched.over = Some(Hovered::Push(push));
+    }
+    if let Some((at, push)) = table.clicked.and_then(|at| Some((at, push(at)?))) {
+        touched.candidate = Some(at);
+        ask.push(Command::Preview(push));
+    }
+}
+
+/// The button that does the chosen push.
+pub fn push_button(ui: &mut Ui, session: &Session, model: &Model, decision: &Decision, ask: &mut Vec<Command>) {
+    let chosen = model.candidate.and_then(|at| Some((at, decision.candidates.get(at)?)));
+    let title = chosen.map_or("Push this".to_owned(), |(at, _)| format!("Push this: {at}"));
+    let dropped = session.record.steps.iter().any(|step| !step.dropped.is_empty());
+    let missing = match chosen {
+        _ if dropped => Some("An object was dropped: this episode pushes no more"),
+        None => Some("Choose a push first"),
+        Some((_, candidate)) if candidate.rejection.is_some() => Some("This push was rejected"),
+        Some(_) => None,
+    };
+    if do_instead(ui, session, model.cursor, "Push this", &title, missing)
+        && let Some((_, candidate)) = chosen
+    {
+        ask.push(Command::DoInstead(Action::Push(candidate.push)));
+    }
+}
+
+/// A button that does something else than the policy would; says whether it was pressed.
+fn do_instead(ui: &mut Ui, session: &Session, cursor: usize, name: &str, title: &str, missing: Option<&str>) -> bool {
+    let hindrance = missing.or(match session {
+        session if cursor < session.steps() => Some("Go to the last state, or branch here, to do something else"),
+        session if session.is_finished() => Some("The budget is used up"),
+        session if session.activity != Activity::Idle => Some("Busy: wait, or cancel"),
+        _ => None,
+    });
+    let button = ui.add_enabled(hindrance.is_none(), Button::new(title).small());
+    button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, hindrance.is_none(), name));
+    let button = button.on_hover_text("Does this in place of what the policy would do");
+    button.on_disabled_hover_text(hindrance.unwrap_or_default()).clicked()
+}

@@ -1,0 +1,375 @@
+//! What pushes would do: the candidates on the floor, and for a chosen one the prediction beside now and what happened.
+
+use super::arrows::{Look, arrow, ends, nearest, tag};
+use super::decision;
+use super::facts::{self, fact};
+use super::floor::{Drawn, FloorMap, Line, Outlines, in_window};
+use super::legend::{self, Bar};
+use super::push_review::{self, Review};
+use super::table::Sort;
+use super::textures::{self, Textures};
+use super::weighed;
+use super::{NO_EPISODE, Touched, empty, heading, maps, words};
+use crate::colors::Colormap;
+use crate::picture;
+use crate::workbench::command::Command;
+use crate::workbench::derive::{Derived, MapKind};
+use crate::workbench::model::{Hovered, Model, Picked, Preview};
+use crate::workbench::session::{Session, SessionId};
+use nudge_core::belief::PushPrediction;
+use nudge_core::grid::Grid;
+use nudge_core::plan::{Action, CandidateRecord, Decision};
+use nudge_core::tool::Push;
+use rerun::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
+use std::sync::Arc;
+
+/// How much of the robot's side is shown, metres.
+const APRON_M: f32 = 0.05;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shown {
+    Now,
+    Predicted(Push),
+    Change(Push),
+    After,
+}
+
+/// What the panel remembers.
+pub struct State {
+    last: Option<Arc<Derived>>,
+    textures: Textures<(SessionId, usize, Shown)>,
+    outlines: Outlines,
+    outlines_after: Outlines,
+    sort: Sort,
+    rejected: bool,
+    hovering: bool,
+    review: Option<Review>,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            last: None,
+            textures: Textures::default(),
+            outlines: Outlines::default(),
+            outlines_after: Outlines::default(),
+            sort: Sort::falling(1),
+            rejected: false,
+            hovering: false,
+            review: None,
+        }
+    }
+}
+
+/// Draws the candidates and what the chosen one would do.
+pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+    let mut state = std::mem::take(&mut model.panels.push);
+    let touched = draw(&mut state, ui, model, ask);
+    touched.apply(model, &mut state.hovering);
+    model.panels.push = state;
+}
+
+fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
+    let mut touched = Touched::default();
+    let Some(session) = model.session() else {
+        empty(ui, NO_EPISODE);
+        return touched;
+    };
+    let step = model.cursor.min(session.steps());
+    if let Some(derived) = model.derived() {
+        state.last = Some(derived.clone());
+    }
+    let decision = session.decision_after(model.cursor);
+    let here = Here { session, model, step, grid: *session.moment(step).belief.grid() };
+    egui::ScrollArea::vertical().id_salt("push").auto_shrink(false).show(ui, |ui| {
+        ui.spacing_mut().item_spacing.y = 4.0;
+        match decision.filter(|decision| !decision.candidates.is_empty()) {
+            Some(decision) => here.candidates(state, ui, decision, &mut touched, ask),
+            None => {
+                let text = match decision {
+                    None => "Nothing weighed yet: decide, to see what pushes would do",
+                    Some(_) => "No push was considered before this step",
+                };
+                heading(ui, "Push candidates", "");
+                ui.weak(text);
+            }
+        }
+        here.review(state, ui);
+    });
+    touched
+}
+
+/// The state at the cursor.
+struct Here<'a> {
+    session: &'a Session,
+    model: &'a Model,
+    step: usize,
+    grid: Grid,
+}
+
+impl Here<'_> {
+    fn candidates(
+        &self,
+        state: &mut State,
+        ui: &mut Ui,
+        decision: &Decision,
+        touched: &mut Touched,
+        ask: &mut Vec<Command>,
+    ) {
+        let title = format!("Push candidates before step {}", self.step + 1);
+        heading(ui, title, "Every arrow is the way of the tool's tip; the colour is its value, gain + γ·Reg");
+        self.floor(state, ui, decision, touched, ask);
+        let State { sort, rejected, .. } = state;
+        let table = decision::push_table(ui, sort, rejected, self.model, self.session, decision, 190.0);
+        decision::apply_push(table, decision, touched, ask);
+        decision::push_button(ui, self.session, self.model, decision, ask);
+        ui.add_space(6.0);
+        match self.model.candidate.and_then(|at| Some((at, decision.candidates.get(at)?))) {
+            Some((at, candidate)) => self.chosen(state, ui, at, candidate, ask),
+            None => {
+                ui.weak("Click a push to see what it would do");
+            }
+        }
+    }
+
+    /// The belief at the cursor, if it is painted.
+    fn now(&self, state: &mut State, ctx: &egui::Context) -> Option<TextureHandle> {
+        let derived = state.last.clone().filter(|last| last.of == (self.session.id, self.step))?;
+        let map = derived.maps.get(&MapKind::Semantics)?;
+        Some(state.textures.get(ctx, (self.session.id, self.step, Shown::Now), || textures::of_rgb(map)))
+    }
+
+    /// The candidates as arrows on the floor.
+    fn floor(
+        &self,
+        state: &mut State,
+        ui: &mut Ui,
+        decision: &Decision,
+        touched: &mut Touched,
+        ask: &mut Vec<Command>,
+    ) {
+        let picture = self.now(state, ui.ctx());
+        let outlines = state.outlines.of(&self.session.moment(self.step).bodies);
+        let map = FloorMap {
+            grid: &self.grid,
+            picture: picture.as_ref(),
+            outlines: &outlines,
+            picked: None,
+            apron_m: APRON_M,
+            name: "Push candidates on the floor",
+        };
+        let width = ui.available_width().min(620.0);
+        let drawn = map.show(ui, width);
+        let gamma = self.session.record.config.planner.gamma;
+        let range = value_range(decision, gamma);
+        let arrows: Vec<(usize, &CandidateRecord, [Pos2; 2])> = decision
+            .candidates
+            .iter()
+            .enumerate()
+            .filter(|(_, candidate)| state.rejected || candidate.rejection.is_none())
+            .map(|(at, candidate)| (at, candidate, ends(&drawn.frame, &candidate.push)))
+            .filter(|(_, _, ends)| ends.iter().all(|end| end.x.is_finite() && end.y.is_finite()))
+            .collect();
+        let over = drawn.response.hover_pos().and_then(|pointer| nearest(&arrows, pointer));
+        let hovered = match self.model.hovered {
+            Hovered::Push(push) => Some(push),
+            _ => None,
+        };
+        let painter = ui.painter_at(drawn.response.rect);
+        // The rejected below, the best on top.
+        let mut order: Vec<&(usize, &CandidateRecord, [Pos2; 2])> = arrows.iter().collect();
+        let rank = |candidate: &CandidateRecord| weighed::value(candidate, gamma).unwrap_or(f32::NEG_INFINITY);
+        order.sort_by(|a, b| rank(a.1).total_cmp(&rank(b.1)));
+        let pushed = weighed::pushed(decision);
+        for (at, candidate, ends) in order {
+            let picked = self.model.candidate == Some(*at) || over == Some(*at) || hovered == Some(candidate.push);
+            let look = match weighed::value(candidate, gamma) {
+                _ if candidate.rejection.is_some() => Look::Rejected,
+                Some(value) => Look::Weighed(legend::ink(Colormap::Cividis.of(value, range))),
+                None => Look::Weighed(Color32::WHITE),
+            };
+            arrow(&painter, *ends, look, picked);
+            if pushed == Some(*at) || (pushed.is_none() && decision.best_push == Some(*at)) {
+                let text = if pushed.is_some() { "chosen" } else { "best" };
+                tag(ui, &painter, ends[1], text);
+            }
+        }
+        if let Some((at, candidate)) = over.and_then(|at| Some((at, decision.candidates.get(at)?))) {
+            touched.over = Some(Hovered::Push(candidate.push));
+            let text = describe(at, candidate, gamma);
+            Tooltip::for_widget(&drawn.response).at_pointer().gap(12.0).show(|ui| ui.label(text));
+            if drawn.response.clicked() {
+                touched.candidate = Some(at);
+                ask.push(Command::Preview(candidate.push));
+            }
+        }
+        ui.scope(|ui| {
+            ui.set_max_width(width.min(420.0));
+            let ends = range.map(|nats| words::significant(f64::from(nats), 3));
+            let hint = "Gain + γ·Reg, nats: what looking has to beat";
+            legend::bar(ui, &Bar { name: "value", ends, unit: "value, nats", hint }, |t| Colormap::Cividis.rgb(t));
+        });
+        let note = if state.rejected { "grey, dashed: rejected" } else { "rejected pushes are hidden" };
+        ui.label(RichText::new(format!("front edge at the bottom; {note}")).small().weak());
+    }
+
+    /// What a push would do: now, predicted, the change, and what happened if it was done.
+    fn chosen(&self, state: &mut State, ui: &mut Ui, at: usize, candidate: &CandidateRecord, ask: &mut Vec<Command>) {
+        let gamma = self.session.record.config.planner.gamma;
+        heading(ui, format!("Push {at}"), "The push that was clicked");
+        let nats = |value: Option<f32>| value.map_or("not weighed".to_owned(), words::nats);
+        let [x, y, _] = candidate.push.start;
+        let way = format!("{:.0} mm to {:.0}°", candidate.push.length_m * 1e3, candidate.push.direction_deg);
+        let view = candidate.view.map_or("n/a".to_owned(), |view| view.0.to_string());
+        let place = format!("x {}, y {} m", words::metres(x), words::metres(y));
+        let facts = [
+            fact("value", nats(weighed::value(candidate, gamma)), "Gain + γ·Reg"),
+            fact("gain", nats(candidate.gain), "Best single view under the predicted belief"),
+            fact("Reg", nats(candidate.reg), "min(0, H(labels) − H(labels, predicted)): what it would blur"),
+            fact("best view", view, "The view with that gain"),
+            fact("from", place, "Where the tip starts"),
+            fact("way", way.replace('-', "−"), "Length and direction; 90° is into the shelf"),
+        ];
+        facts::show(ui, "push numbers", 2, &facts);
+        if let Some(rejection) = &candidate.rejection {
+            ui.label(format!("Rejected: {}", words::rejection(rejection)));
+        }
+        let asked = |preview: &&Preview| preview.of == (self.session.id, self.step) && preview.push == candidate.push;
+        match self.model.preview.as_ref().filter(asked) {
+            Some(preview) => self.prediction(state, ui, preview, ask),
+            None => {
+                ui.weak("Click the push to predict what it would do");
+            }
+        }
+    }
+
+    fn prediction(&self, state: &mut State, ui: &mut Ui, preview: &Preview, ask: &mut Vec<Command>) {
+        let Some(derived) = state.last.clone().filter(|last| last.of == (self.session.id, self.step)) else {
+            ui.weak("Painting the maps");
+            return;
+        };
+        let (prediction, push) = (&preview.prediction, preview.push);
+        let (grid, catalog) = (self.grid, &self.session.setup.catalog);
+        let key = |shown: Shown| (self.session.id, self.step, shown);
+        let ctx = ui.ctx().clone();
+        let now = self.now(state, &ctx);
+        let predicted = state.textures.get(&ctx, key(Shown::Predicted(push)), || {
+            textures::of_rgb(&picture::paint(&grid, |cell| {
+                let at = in_window(&prediction.window, &grid, cell);
+                let after = at.and_then(|at| prediction.semantics.get(at));
+                picture::semantics_rgb(after.unwrap_or(&derived.belief.semantics[cell]), catalog)
+            }))
+        });
+        let change = state.textures.get(&ctx, key(Shown::Change(push)), || {
+            textures::of_rgb(&picture::paint(&grid, |cell| Colormap::Viridis.rgb(change_at(prediction, &grid, cell))))
+        });
+        let after = self.session.moments.get(self.step + 1).filter(|moment| {
+            moment.outcome.as_ref().is_some_and(|outcome| outcome.record.action == Action::Push(push))
+        });
+        let happened = after.map(|moment| {
+            let labels = || textures::of_rgb(&picture::paint_labels(&grid, &moment.truth.labels, catalog));
+            (state.textures.get(&ctx, key(Shown::After), labels), state.outlines_after.of(&moment.bodies))
+        });
+        let outlines = state.outlines.of(&self.session.moment(self.step).bodies);
+        let gap = 10.0;
+        let width = (0.5 * (ui.available_width() - gap)).floor().clamp(40.0, 420.0);
+        let mut one = |ui: &mut Ui, title: &str, hint: &str, picture: Option<&TextureHandle>, outlines: &[Line]| {
+            ui.vertical(|ui| {
+                ui.set_width(width);
+                heading(ui, title, hint);
+                let name = format!("Map of the push: {}", title.to_lowercase());
+                let picked = maps::picked_cell(self.model.picked, &grid);
+                let map = FloorMap { grid: &grid, picture, outlines, picked, apron_m: 0.0, name: &name };
+                let drawn: Drawn = map.show(ui, width);
+                let way = ends(&drawn.frame, &push);
+                arrow(&ui.painter_at(drawn.response.rect), way, Look::Weighed(Color32::WHITE), false);
+                drawn.tell(|cell| {
+                    let change = words::probability(change_at(prediction, &grid, cell));
+                    format!("{}\nchanges with probability {change}", words::cell_place(&grid, grid.cell(cell)))
+                });
+                if let Some(cell) = drawn.over.filter(|_| drawn.response.clicked()) {
+                    ask.push(Command::Pick(Some(Picked::Cell(cell))));
+                }
+            });
+        };
+        ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing.x = gap;
+            one(ui, "Now", "The likeliest classes before the push", now.as_ref(), &outlines);
+            one(
+                ui,
+                "Predicted",
+                "The likeliest classes that the push is predicted to leave",
+                Some(&predicted),
+                &outlines,
+            );
+        });
+        ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing.x = gap;
+            one(ui, "Change", "Probability that the push changes a floor cell, 0 to 1", Some(&change), &outlines);
+            if let Some((picture, outlines)) = &happened {
+                one(ui, "What happened", "The true classes after the push", Some(picture), outlines);
+            }
+        });
+        ui.scope(|ui| {
+            ui.set_max_width(width);
+            let texts = Bar {
+                name: "change",
+                ends: ["0".to_owned(), "1".to_owned()],
+                unit: "probability of change",
+                hint: "Viridis, the colours of probabilities",
+            };
+            legend::bar(ui, &texts, |t| Colormap::Viridis.rgb(t));
+        });
+        let swept = preview.swept.len() as f32 * grid.voxel_m.powi(3) * 1e3;
+        let expected: f32 = prediction.change.iter().filter(|change| change.is_finite()).sum();
+        let cell_cm2 = grid.voxel_m * grid.voxel_m * 1e4;
+        let text = format!(
+            "the tool sweeps {} litres; about {} cm² of the floor are expected to change",
+            words::significant(f64::from(swept), 2),
+            words::significant(f64::from(expected * cell_cm2), 2)
+        );
+        ui.label(RichText::new(text).small());
+    }
+
+    /// What the push that led to the state at the cursor did.
+    fn review(&self, state: &mut State, ui: &mut Ui) {
+        let moment = self.session.moment(self.step);
+        let pushed = moment.outcome.as_ref().is_some_and(|outcome| outcome.push_outcome.is_some());
+        if self.step == 0 || !pushed {
+            return;
+        }
+        let key = (self.session.id, self.step);
+        let known = state.review.filter(|review| review.of == key);
+        let review = known.unwrap_or_else(|| Review::of(self.session.id, self.session.moment(self.step - 1), moment));
+        state.review = Some(review);
+        ui.add_space(8.0);
+        push_review::show(ui, &review, &self.session.record, moment);
+    }
+}
+
+/// From the least to the largest value of the feasible candidates.
+fn value_range(decision: &Decision, gamma: f32) -> [f32; 2] {
+    let values = decision.candidates.iter().filter_map(|candidate| weighed::value(candidate, gamma));
+    let [low, high] =
+        values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
+    if low <= high { [low, high] } else { [0.0, 0.0] }
+}
+
+/// The probability that a push changes a cell; 0 outside the window of its prediction.
+fn change_at(prediction: &PushPrediction, grid: &Grid, cell: usize) -> f32 {
+    let at = in_window(&prediction.window, grid, cell);
+    at.and_then(|at| prediction.change.get(at)).copied().unwrap_or(0.0)
+}
+
+/// A candidate in words, for the tooltip.
+fn describe(at: usize, candidate: &CandidateRecord, gamma: f32) -> String {
+    match (&candidate.rejection, weighed::value(candidate, gamma)) {
+        (Some(rejection), _) => format!("Push {at}, rejected: {}", words::rejection(rejection)),
+        (None, None) => format!("Push {at}: not weighed"),
+        (None, Some(value)) => {
+            let gain = words::nats(candidate.gain.unwrap_or(0.0));
+            let reg = words::nats(gamma * candidate.reg.unwrap_or(0.0));
+            format!("Push {at}: {}\ngain {gain}, γ·Reg {reg}", words::nats(value))
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! The panels on a real short episode, by what a person sees and presses; and their pictures, for a person to look at.
+
+use super::*;
+use crate::workbench::command::Command;
+use crate::workbench::fixture;
+use crate::workbench::model::{LayoutKind, Picked};
+use crate::workbench::session::Activity;
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT, Queryable};
+use nudge_core::plan::Action;
+use std::sync::Arc;
+
+mod look;
+
+type Show = fn(&mut egui::Ui, &mut Model, &mut Vec<Command>);
+
+const PANELS: [(&str, Show); 8] = [
+    ("maps", maps::show),
+    ("camera", camera::show),
+    ("curves", curves::show),
+    ("decision", decision::show),
+    ("why", why::show),
+    ("gains", gains::show),
+    ("push", push::show),
+    ("compare", compare::show),
+];
+
+/// A model and what was asked for.
+struct Stage {
+    model: Model,
+    asked: Vec<Command>,
+    show: Show,
+}
+
+fn harness(show: Show, model: Model) -> Harness<'static, Stage> {
+    let draw = |ui: &mut egui::Ui, stage: &mut Stage| (stage.show)(ui, &mut stage.model, &mut stage.asked);
+    let stage = Stage { model, asked: Vec::new(), show };
+    let mut harness = Harness::builder().with_size([640.0, 900.0]).build_ui_state(draw, stage);
+    harness.run_steps(3);
+    harness
+}
+
+fn has(harness: &Harness<'_, Stage>, text: &str) -> bool {
+    harness.query_all_by_label_contains(text).next().is_some()
+}
+
+/// A click at a place, after the pointer went there.
+fn click_at(harness: &mut Harness<'_, Stage>, at: egui::Pos2) {
+    harness.hover_at(at);
+    harness.run_steps(1);
+    for pressed in [true, false] {
+        let modifiers = egui::Modifiers::NONE;
+        harness.event(egui::Event::PointerButton { pos: at, button: egui::PointerButton::Primary, pressed, modifiers });
+    }
+    harness.run_steps(3);
+}
+
+/// The last thing asked for, if `is` takes it.
+fn asked<T>(harness: &Harness<'_, Stage>, is: impl Fn(&Command) -> Option<T>) -> Option<T> {
+    harness.state().asked.iter().rev().find_map(is)
+}
+
+#[test]
+fn without_an_episode_every_panel_says_what_to_do() {
+    for (name, show) in PANELS {
+        let harness = harness(show, Model::default());
+        assert!(has(&harness, "Open a scene, or drop one here"), "{name}");
+    }
+}
+
+#[test]
+fn every_panel_draws_every_state() {
+    for (name, show) in PANELS {
+        let mut model = fixture::model_of(vec![fixture::session(1), fixture::stray_session(2)]);
+        model.other = Some(model.sessions[1].id);
+        model.kept.layout = LayoutKind::Compare;
+        (model.picked, model.view, model.candidate) = (Some(Picked::Voxel(777)), Some(ViewId(3)), Some(0));
+        let mut harness = harness(show, model);
+        for cursor in 0..=7 {
+            harness.state_mut().model.cursor = cursor;
+            harness.run_steps(2);
+        }
+        for picked in [Some(Picked::Cell(1)), Some(Picked::Cell(usize::MAX)), Some(Picked::Voxel(usize::MAX)), None] {
+            harness.state_mut().model.picked = picked;
+            harness.run_steps(1);
+        }
+        (harness.state_mut().model.view, harness.state_mut().model.candidate) = (Some(ViewId(9999)), Some(9999));
+        harness.state_mut().model.slice_m = Some(f32::NAN);
+        harness.run_steps(2);
+        // Before anything is painted, and with an episode that has only its prior and nothing pending.
+        let model = &mut harness.state_mut().model;
+        model.derived.clear();
+        model.panels = State::default();
+        model.sessions[0].moments.truncate(1);
+        model.sessions[0].pending = None;
+        model.sessions[0].record.steps.clear();
+        harness.run_steps(2);
+        assert!(harness.root().accesskit_node().children().next().is_some(), "{name} draws nothing");
+    }
+}
+
+#[test]
+fn numbers_that_are_none_and_other_arrays_do_no_harm() {
+    for (_, show) in PANELS {
+        let mut model = fixture::model();
+        let mut decision = (*model.sessions[0].pending.clone().expect("pending")).clone();
+        (decision.igv, decision.igm, decision.reg) = (f32::NAN, f32::INFINITY, f32::NAN);
+        decision.gains = vec![f32::NAN, 3.0];
+        decision.pair = vec![ViewId(60_000)];
+        for candidate in &mut decision.candidates {
+            (candidate.gain, candidate.push.direction_deg) = (Some(f32::NAN), f32::NAN);
+        }
+        decision.best_push = Some(9999);
+        model.sessions[0].pending = Some(Arc::new(decision));
+        let mut views = (*model.sessions[0].setup.views).clone();
+        views.layout = [4, 1, 7];
+        views.views.truncate(2);
+        model.sessions[0].setup.views = Arc::new(views);
+        (model.view, model.candidate) = (Some(ViewId(1)), Some(0));
+        let mut harness = harness(show, model);
+        harness.run_steps(2);
+    }
+}
+
+#[test]
+fn a_click_on_a_map_asks_about_its_cell() {
+    let mut harness = harness(maps::show, fixture::model());
+    for title in ["Semantics", "Certainty", "Entropy", "Truth", "Error", "Classes"] {
+        assert!(harness.query_by_label(title).is_some(), "{title}");
+    }
+    let map = harness.get_by_label("Map of truth").rect();
+    let at = map.left_bottom() + egui::vec2(0.25 * map.width(), -0.5);
+    click_at(&mut harness, at);
+    let cell = asked(&harness, |command| match command {
+        Command::Pick(Some(Picked::Cell(cell))) => Some(*cell),
+        _ => None,
+    });
+    let grid = *harness.state().model.sessions[0].moments[0].belief.grid();
+    let expected = grid.cell_index(nudge_core::grid::Cell { x: (grid.dims[0] / 4) as u16, y: 0 });
+    assert_eq!(cell, Some(expected));
+}
+
+#[test]
+fn maps_stay_until_the_next_are_painted_and_a_slice_takes_the_first_place() {
+    let mut harness = harness(maps::show, fixture::model());
+    let model = &mut harness.state_mut().model;
+    model.cursor = 2;
+    model.derived.clear();
+    harness.run_steps(2);
+    assert!(has(&harness, "Painting step 2") && harness.query_by_label("Map of semantics").is_some());
+    let model = &mut harness.state_mut().model;
+    model.slice_m = Some(0.055);
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Occupancy at 0.055 m").is_some());
+    assert!(harness.query_by_label("Map of semantics").is_none());
+    harness.get_by_label("Slice").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().model.slice_m, None);
+}
+
+#[test]
+fn the_camera_shows_the_last_look() {
+    let mut harness = harness(camera::show, fixture::model());
+    let model = &mut harness.state_mut().model;
+    // The fourth action is a push: the image of the third stays.
+    model.cursor = 4;
+    let Action::Look { view } = model.sessions[0].record.steps[2].action else { panic!("a look") };
+    harness.run_steps(2);
+    assert!(has(&harness, &format!("Camera: view {} at step 3", view.0)));
+    assert!(harness.query_by_label("Depth image").is_some() && harness.query_by_label("Label image").is_some());
+    harness.state_mut().model.cursor = 0;
+    harness.run_steps(2);
+    assert!(has(&harness, "No image yet"));
+}
+
+#[test]
+fn a_click_on_the_curves_moves_the_cursor() {
+    let mut harness = harness(curves::show, fixture::model());
+    let plot = harness.get_by_label("Scores over the steps").rect();
+    let at = plot.center();
+    click_at(&mut harness, at);
+    let step = asked(&harness, |command| match command {
+        Command::GoTo(step) => Some(*step),
+        _ => None,
+    });
+    assert_eq!(step, Some(3), "the budget is six");
+}
+
+#[test]
+fn the_decision_says_what_why_and_lets_a_person_do_something_else() {
+    let mut harness = harness(decision::show, fixture::model());
+    assert!(has(&harness, "Step 6 of 6") && has(&harness, "because nothing is pushed in the last step"));
+    // The second row of the views: pointing at it, then choosing it.
+    let rows: Vec<egui::Rect> = harness.query_all_by_label_contains(", gain ").map(|row| row.rect()).collect();
+    assert_eq!(rows.len(), weighed::LISTED);
+    harness.hover_at(rows[1].center());
+    harness.run_steps(2);
+    let Hovered::View(over) = harness.state().model.hovered else { panic!("nothing under the pointer") };
+    harness.hover_at(egui::pos2(1.0, 1.0));
+    harness.run_steps(2);
+    assert_eq!(harness.state().model.hovered, Hovered::Nothing);
+    click_at(&mut harness, rows[1].center());
+    assert_eq!(harness.state().model.view, Some(over));
+    harness.get_by_label("Look from here").click();
+    harness.run_steps(2);
+    let done = asked(&harness, |command| match command {
+        Command::DoInstead(action) => Some(*action),
+        _ => None,
+    });
+    assert_eq!(done, Some(Action::Look { view: over }));
+}
+
+#[test]
+fn nothing_else_can_be_done_in_the_past_or_while_busy() {
+    let disabled = |harness: &Harness<'_, Stage>| harness.get_by_label("Look from here").accesskit_node().is_disabled();
+    let mut model = fixture::model();
+    model.view = Some(ViewId(3));
+    let mut harness = harness(decision::show, model);
+    assert!(!disabled(&harness));
+    harness.state_mut().model.sessions[0].activity = Activity::Running;
+    harness.run_steps(2);
+    assert!(disabled(&harness));
+    harness.state_mut().model.sessions[0].activity = Activity::Idle;
+    harness.state_mut().model.cursor = 2;
+    harness.run_steps(2);
+    assert!(disabled(&harness));
+}
+
+#[test]
+fn a_click_on_a_heading_sorts() {
+    let mut harness = harness(decision::show, fixture::model());
+    let first = |harness: &Harness<'_, Stage>| {
+        let rows = harness.query_all_by_label_contains(", gain ");
+        let top = rows.min_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).expect("rows");
+        top.accesskit_node().label().expect("named")
+    };
+    let best = first(&harness);
+    harness.get_by_label("Sort by Gain").click();
+    harness.run_steps(3);
+    assert_ne!(first(&harness), best);
+    harness.get_by_label("Sort by Gain").click();
+    harness.run_steps(3);
+    assert_eq!(first(&harness), best);
+}
+
+#[test]
+fn why_tells_the_causes_of_a_swept_voxel() {
+    let mut model = fixture::model();
+    let outcome = model.sessions[0].moments[4].outcome.clone().expect("step 4");
+    let swept = &outcome.swept.as_ref().expect("step 4 is a push").swept;
+    let voxel = swept.iter().nth(swept.len() / 2).expect("sweeps something");
+    model.picked = Some(Picked::Voxel(voxel));
+    let mut harness = harness(why::show, model);
+    assert!(has(&harness, "Voxel at") && has(&harness, "step 4: push swept it"));
+    harness.query_all_by_label_contains("step 4: push swept it").next().expect("cause").click();
+    harness.run_steps(2);
+    assert!(asked(&harness, |command| matches!(command, Command::GoTo(4)).then_some(())).is_some());
+    harness.get_by_label("Its floor cell").click();
+    harness.run_steps(2);
+    let cell = asked(&harness, |command| match command {
+        Command::Pick(Some(Picked::Cell(cell))) => Some(*cell),
+        _ => None,
+    });
+    let height = harness.state().model.sessions[0].moments[0].belief.grid().dims[2];
+    assert_eq!(cell, Some(voxel / height));
+}
+
+#[test]
+fn why_names_the_label_that_a_cell_was_given() {
+    let mut model = fixture::model();
+    let outcome = model.sessions[0].moments[1].outcome.clone().expect("step 1");
+    let labels = &outcome.observation.as_ref().expect("a look").labels;
+    let cell = labels.iter().position(|label| *label < 14).expect("something was seen");
+    let name = crate::colors::class_title(&model.sessions[0].setup.catalog, nudge_core::scene::ClassId(labels[cell]));
+    model.picked = Some(Picked::Cell(cell));
+    let harness = harness(why::show, model);
+    assert!(has(&harness, "Floor cell at") && has(&harness, &format!("labelled {name}")));
+}
+
+#[test]
+fn a_click_on_a_heat_map_explains_a_view() {
+    let mut harness = harness(gains::show, fixture::model());
+    assert_eq!(harness.query_all_by_label_contains("Gain of the views at target").count(), 3);
+    let map = harness.get_by_label("Gain of the views at target 2").rect();
+    let at = map.left_bottom() + egui::vec2(2.0, -2.0);
+    harness.hover_at(at);
+    harness.run_steps(2);
+    // The lowest left position of the second target is the second view.
+    assert_eq!(harness.state().model.hovered, Hovered::View(ViewId(1)));
+    click_at(&mut harness, at);
+    assert!(asked(&harness, |command| matches!(command, Command::GainOf(ViewId(1))).then_some(())).is_some());
+    fixture::answer(&mut harness.state_mut().model);
+    harness.run_steps(2);
+    assert!(has(&harness, "By height") && has(&harness, "from all voxels"));
+}
+
+#[test]
+fn a_push_is_predicted_and_then_judged() {
+    let mut model = fixture::model();
+    model.cursor = 3;
+    let mut harness = harness(push::show, model);
+    let row = harness.query_all_by_label_contains(", value ").next().expect("a feasible push").rect();
+    click_at(&mut harness, row.center());
+    assert!(harness.state().model.candidate.is_some());
+    assert!(asked(&harness, |command| matches!(command, Command::Preview(_)).then_some(())).is_some());
+    let model = &mut harness.state_mut().model;
+    let decision = model.sessions[0].moments[4].decision().expect("step 4").clone();
+    model.candidate = weighed::pushed(&decision);
+    fixture::answer(model);
+    harness.run_steps(2);
+    for title in ["Now", "Predicted", "Change", "What happened"] {
+        assert!(harness.query_by_label(title).is_some(), "{title}");
+    }
+    harness.state_mut().model.cursor = 4;
+    harness.run_steps(2);
+    assert!(has(&harness, "What the push of step 4 did") && has(&harness, "precision"));
+}
+
+#[test]
+fn a_comparison_tells_where_two_episodes_part() {
+    let mut model = fixture::model_of(vec![fixture::session(1), fixture::stray_session(2)]);
+    model.kept.layout = LayoutKind::Compare;
+    let mut harness = harness(compare::show, model);
+    assert!(has(&harness, "Choose a second episode"));
+    harness.state_mut().model.other = Some(crate::workbench::session::SessionId(2));
+    harness.run_steps(2);
+    assert!(has(&harness, "They part at step 2: A looks from view"));
+    assert!(has(&harness, "B ends after step 3"));
+    harness.get_by_label("Go to step 1").click();
+    harness.run_steps(2);
+    assert!(asked(&harness, |command| matches!(command, Command::GoTo(1)).then_some(())).is_some());
+    for map in ["Floor map of A", "Floor map of B", "Floor map of A − B"] {
+        assert!(harness.query_by_label(map).is_some(), "{map}");
+    }
+}

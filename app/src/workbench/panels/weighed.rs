@@ -1,0 +1,186 @@
+//! What a decision weighed, in order: views by gain, pushes by value; as rows of tables.
+
+use super::table::{Cell, Column, Row};
+use super::words;
+use nudge_core::camera::{ViewArray, ViewId};
+use nudge_core::episode::EpisodeRecord;
+use nudge_core::plan::{Action, CandidateRecord, Decision};
+use std::collections::BTreeSet;
+
+/// How many views and pushes the tables list.
+pub const LISTED: usize = 10;
+
+/// The views that looks since the last push have used up after `step` actions.
+pub fn used_views(record: &EpisodeRecord, step: usize) -> BTreeSet<ViewId> {
+    let mut used = BTreeSet::new();
+    for step in record.steps.iter().take(step) {
+        match step.action {
+            Action::Look { view } => {
+                used.insert(view);
+            }
+            Action::Push(_) => used.clear(),
+        }
+    }
+    used
+}
+
+/// What a candidate is worth, nats: `gain + gamma Reg`; `None` if it was rejected or not weighed.
+pub fn value(candidate: &CandidateRecord, gamma: f32) -> Option<f32> {
+    let value = candidate.gain? + gamma * candidate.reg.unwrap_or(0.0);
+    value.is_finite().then_some(value)
+}
+
+/// Positions in the order of falling values; what is no number comes last.
+fn falling(values: impl Iterator<Item = Option<f32>>) -> Vec<usize> {
+    let of = |value: Option<f32>| value.filter(|value| value.is_finite()).unwrap_or(f32::NEG_INFINITY);
+    let mut order: Vec<(usize, f32)> = values.map(of).enumerate().collect();
+    order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    order.into_iter().map(|(at, _)| at).collect()
+}
+
+/// The best gain of all views, nats.
+pub fn best_gain(decision: &Decision) -> f32 {
+    decision.gains.iter().copied().filter(|gain| gain.is_finite()).fold(0.0, f32::max)
+}
+
+/// The view that a decision looks from.
+pub fn looked_from(decision: &Decision) -> Option<ViewId> {
+    match decision.action {
+        Action::Look { view } => Some(view),
+        Action::Push(_) => None,
+    }
+}
+
+/// The candidate that a decision pushes.
+pub fn pushed(decision: &Decision) -> Option<usize> {
+    match decision.action {
+        Action::Look { .. } => None,
+        Action::Push(push) => decision.candidates.iter().position(|candidate| candidate.push == push),
+    }
+}
+
+/// Columns of [`view_rows`].
+pub const VIEW_COLUMNS: [Column; 5] = [
+    Column { title: "View", hint: "Number of the view in its array", width: 34.0 },
+    Column {
+        title: "Gain",
+        hint: "Information gain of the view alone, nats: IG(v) = Σ rays Σ voxels H(p)·Π(1 − p)",
+        width: 52.0,
+    },
+    Column { title: "Of best", hint: "Share of the best view's gain", width: 46.0 },
+    Column { title: "Camera at", hint: "Column, row and look-at target in the array, counted from 1", width: 62.0 },
+    Column { title: "Note", hint: "Whether it is chosen, in the best pair, or used since the last push", width: 60.0 },
+];
+
+/// The best views of a decision.
+pub fn view_rows(
+    decision: &Decision,
+    views: &ViewArray,
+    used: &BTreeSet<ViewId>,
+    selected: Option<ViewId>,
+) -> Vec<Row> {
+    let best = best_gain(decision);
+    let looked = looked_from(decision);
+    let order = falling(decision.gains.iter().map(|gain| Some(*gain)));
+    let row = |at: usize| {
+        let (id, gain) = (ViewId(at as u16), decision.gains[at]);
+        let note = match decision.pair.iter().position(|view| *view == id) {
+            _ if looked == Some(id) => "chosen",
+            Some(0) => "first of pair",
+            Some(_) => "second of pair",
+            None if used.contains(&id) => "used",
+            None => "",
+        };
+        let slot = views.view(id).map_or_else(String::new, |view| {
+            format!("{}, {}, {}", view.slot[0] + 1, view.slot[1] + 1, view.slot[2] + 1)
+        });
+        let share = if best > 0.0 { gain / best } else { f32::NAN };
+        Row {
+            key: at,
+            cells: vec![
+                Cell::number(at),
+                Cell::nats(Some(gain)),
+                Cell::Figure(f64::from(share), words::percent(share)),
+                Cell::Word(slot),
+                Cell::Word(note.to_owned()),
+            ],
+            chosen: looked == Some(id),
+            selected: selected == Some(id),
+            grey: used.contains(&id) && looked != Some(id),
+            name: format!("View {at}, gain {}", words::nats(gain)),
+            hint: String::new(),
+        }
+    };
+    order.into_iter().take(LISTED).map(row).collect()
+}
+
+/// Columns of [`push_rows`].
+pub const PUSH_COLUMNS: [Column; 7] = [
+    Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
+    Column { title: "Value", hint: "Gain + γ·Reg, nats: what looking has to beat", width: 50.0 },
+    Column { title: "Gain", hint: "Best single view after the predicted push, nats", width: 50.0 },
+    Column {
+        title: "γ·Reg",
+        hint: "What the push would blur, nats, at most 0: Reg = min(0, H(labels) − H(labels, predicted))",
+        width: 42.0,
+    },
+    Column { title: "To", hint: "Direction in degrees; 90 is into the shelf, 0 to the right", width: 34.0 },
+    Column { title: "mm", hint: "How far the tool pushes, millimetres", width: 30.0 },
+    Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 },
+];
+
+/// Which candidates a table lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Listed {
+    /// The best feasible ones.
+    Best,
+    /// All, the rejected ones last.
+    All,
+}
+
+/// Push candidates of a decision, the best first.
+pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Option<usize>) -> Vec<Row> {
+    let pushed = pushed(decision);
+    let candidates = &decision.candidates;
+    let mut order = falling(candidates.iter().map(|candidate| value(candidate, gamma)));
+    order.sort_by_key(|at| candidates[*at].rejection.is_some());
+    if listed == Listed::Best {
+        order.retain(|at| candidates[*at].rejection.is_none());
+        order.truncate(LISTED);
+    }
+    let row = |at: usize| {
+        let candidate = &candidates[at];
+        let push = &candidate.push;
+        let (note, hint) = match &candidate.rejection {
+            _ if pushed == Some(at) => ("chosen".to_owned(), String::new()),
+            _ if decision.best_push == Some(at) => ("best".to_owned(), String::new()),
+            Some(rejection) => ("rejected".to_owned(), words::capital(&words::rejection(rejection))),
+            None => (String::new(), String::new()),
+        };
+        let place = format!("From x {}, y {} m", words::metres(push.start[0]), words::metres(push.start[1]));
+        let view = candidate.view.map_or_else(String::new, |view| format!("; best seen from view {}", view.0));
+        let name = match (&candidate.rejection, value(candidate, gamma)) {
+            (Some(rejection), _) => format!("Push {at}, rejected: {}", words::rejection(rejection)),
+            (None, Some(value)) => format!("Push {at}, value {}", words::nats(value)),
+            (None, None) => format!("Push {at}, not weighed"),
+        };
+        Row {
+            key: at,
+            cells: vec![
+                Cell::number(at),
+                Cell::nats(value(candidate, gamma)),
+                Cell::nats(candidate.gain),
+                Cell::nats(candidate.reg.map(|reg| gamma * reg)),
+                Cell::Figure(f64::from(push.direction_deg), format!("{:.0}°", push.direction_deg).replace('-', "−")),
+                Cell::Figure(f64::from(push.length_m), format!("{:.0}", push.length_m * 1e3)),
+                Cell::Word(note),
+            ],
+            chosen: pushed == Some(at),
+            selected: selected == Some(at),
+            grey: candidate.rejection.is_some(),
+            name,
+            hint: if hint.is_empty() { format!("{place}{view}") } else { format!("{hint}\n{place}") },
+        }
+    };
+    order.into_iter().map(row).collect()
+}

@@ -7,9 +7,14 @@
 
 pub mod annotations;
 pub mod author;
+pub mod browser;
 pub mod command;
 pub mod derive;
+pub mod export;
+#[cfg(test)]
+pub mod fixture;
 pub mod half_belief;
+pub mod latest;
 pub mod model;
 pub mod panels;
 pub mod session;

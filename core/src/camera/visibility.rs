@@ -48,6 +48,16 @@ pub fn visibility(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<Obje
 /// The bodies that are unseen from every view of the array, in their order. The same answer as [`visibility`] gives, but
 /// a body is left out of the search as soon as a view has shown enough of it.
 pub fn hidden_objects(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<ObjectId> {
+    hidden_objects_while(shelf, bodies, array, || true).unwrap_or_default()
+}
+
+/// The same, given up as soon as `go_on`, asked between rounds of a few views, says no: `None` then.
+pub fn hidden_objects_while(
+    shelf: &Shelf,
+    bodies: &[Body],
+    array: &ViewArray,
+    go_on: impl Fn() -> bool,
+) -> Option<Vec<ObjectId>> {
     let mut unseen: Vec<usize> = (0..bodies.len()).collect();
     // Views that are far apart first: neighbours see the same things.
     let count = array.views.len();
@@ -55,6 +65,9 @@ pub fn hidden_objects(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<
     for round in 0..rounds {
         if unseen.is_empty() {
             break;
+        }
+        if !go_on() {
+            return None;
         }
         let views: Vec<&View> = array.views.iter().skip(round).step_by(rounds).collect();
         let counts: Vec<Vec<usize>> =
@@ -65,7 +78,7 @@ pub fn hidden_objects(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<
             counts.iter().all(|counts| counts[at - 1] < UNSEEN_PX)
         });
     }
-    unseen.into_iter().map(|at| bodies[at].id).collect()
+    Some(unseen.into_iter().map(|at| bodies[at].id).collect())
 }
 
 /// Number of bodies that are unseen from every view of the array.

@@ -1,6 +1,8 @@
 //! What a person says about an episode: notes on its steps, and verdicts on its objects. `notes.json` in the episode's
 //! directory keeps them.
 
+pub use crate::verdicts::{Judged, VERDICTS, object_name, verdict_title};
+
 use nudge_core::files::write_atomically;
 use nudge_core::score::{ObjectVerdict, Verdict};
 use nudge_core::{Error, Result};
@@ -58,59 +60,14 @@ impl Annotations {
     }
 }
 
-/// A verdict of the scorer with what a person made of it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Judged {
-    /// The object's name: `tomato_can#2`; a hallucinated one is named after its place, `tomato_can@(0.12, 0.30)`.
-    pub name: String,
-    /// What the scorer says.
-    pub proposed: ObjectVerdict,
-    /// What a person says instead.
-    pub overruled: Option<Verdict>,
-}
-
-impl Judged {
-    /// The verdict that counts.
-    pub fn verdict(&self) -> Verdict {
-        self.overruled.unwrap_or(self.proposed.verdict)
-    }
-}
-
-/// An object's name in verdict tables and in `notes.json`.
-pub fn object_name(verdict: &ObjectVerdict) -> String {
-    let [x, y] = verdict.position;
-    match verdict.object {
-        Some(object) => format!("{}#{object}", verdict.class),
-        None => format!("{}@({x:.2}, {y:.2})", verdict.class),
-    }
-}
-
-/// A verdict in words.
-pub fn verdict_title(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Found => "found",
-        Verdict::Misclassified => "misclassified",
-        Verdict::NotFound => "not found",
-        Verdict::Hallucinated => "hallucinated",
-    }
-}
-
-/// All verdicts, in the order of tables.
-pub const VERDICTS: [Verdict; 4] =
-    [Verdict::Found, Verdict::Misclassified, Verdict::NotFound, Verdict::Hallucinated];
-
 impl Annotations {
     /// The scorer's verdicts after a step with what a person made of them.
     pub fn judge(&self, step: usize, proposed: &[ObjectVerdict]) -> Vec<Judged> {
-        let overruled = self.verdicts.get(&step);
-        proposed
-            .iter()
-            .map(|proposed| {
-                let name = object_name(proposed);
-                let overruled = overruled.and_then(|verdicts| verdicts.get(&name)).copied();
-                Judged { name, proposed: proposed.clone(), overruled }
-            })
-            .collect()
+        let mut judged = Judged::by_scorer(proposed);
+        if let Some(overruled) = self.verdicts.get(&step) {
+            judged.iter_mut().for_each(|judged| judged.overruled = overruled.get(&judged.name).copied());
+        }
+        judged
     }
 }
 

@@ -36,12 +36,18 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
         .default_size(268.0)
         .size_range(240.0..=380.0)
         .show(ui, |ui| properties::show(ui, author));
-    egui::CentralPanel::default().show(ui, |ui| {
+    let board = egui::CentralPanel::default().show(ui, |ui| {
         toolbar::show(ui, author, ask);
         ui.separator();
-        canvas::show(ui, author, carried);
+        canvas::show(ui, author, carried)
     });
-    keys(ui, author, ask);
+    if !ui.ctx().text_edit_focused() {
+        keys(ui, author, ask);
+        // Arrow keys and letters belong to whatever has the focus; without any, to the board.
+        if board.inner || ui.memory(|memory| memory.focused().is_none()) {
+            keys_on_board(ui, author);
+        }
+    }
 }
 
 /// A class that is carried from the palette, and whether it was let go in this frame.
@@ -66,11 +72,8 @@ const ROTATE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::R);
 const ROTATE_BACK: KeyboardShortcut = KeyboardShortcut::new(Modifiers::SHIFT, Key::R);
 const DELETE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::Delete);
 
-/// What the keyboard asks for, unless somebody is typing.
+/// What the keyboard asks for wherever the focus is.
 fn keys(ui: &egui::Ui, author: &mut Author, ask: &mut Vec<Command>) {
-    if ui.ctx().text_edit_focused() {
-        return;
-    }
     let pressed = |shortcut: &KeyboardShortcut| ui.input_mut(|input| input.consume_shortcut(shortcut));
     // The longer one first: a shortcut also answers to more modifiers than its own.
     if pressed(&REDO) {
@@ -85,6 +88,11 @@ fn keys(ui: &egui::Ui, author: &mut Author, ask: &mut Vec<Command>) {
     if pressed(&DUPLICATE) {
         author.duplicate();
     }
+}
+
+/// What the keyboard does to what is chosen on the board.
+fn keys_on_board(ui: &egui::Ui, author: &mut Author) {
+    let pressed = |shortcut: &KeyboardShortcut| ui.input_mut(|input| input.consume_shortcut(shortcut));
     if pressed(&SELECT_ALL) {
         author.choose_all(0..author.scene().objects.len());
     }
@@ -104,11 +112,15 @@ fn keys(ui: &egui::Ui, author: &mut Author, ask: &mut Vec<Command>) {
             author.choose_none();
         }
     }
-    let arrows =
-        [(Key::ArrowLeft, [-1.0, 0.0]), (Key::ArrowRight, [1.0, 0.0]), (Key::ArrowDown, [0.0, -1.0]), (Key::ArrowUp, [0.0, 1.0])];
     if author.selection().is_empty() {
         return;
     }
+    let arrows = [
+        (Key::ArrowLeft, [-1.0, 0.0]),
+        (Key::ArrowRight, [1.0, 0.0]),
+        (Key::ArrowDown, [0.0, -1.0]),
+        (Key::ArrowUp, [0.0, 1.0]),
+    ];
     for (key, by) in arrows {
         if ui.input_mut(|input| input.consume_key(Modifiers::NONE, key)) {
             author.nudge(by);

@@ -47,15 +47,15 @@ impl Board {
     }
 }
 
-/// Draws the board in what is left of `ui`, and carries out what the pointer does there.
-pub(super) fn show(ui: &mut egui::Ui, author: &mut Author, carried: Option<Carried>) {
+/// Draws the board in what is left of `ui`, and carries out what the pointer does there. Returns whether the keyboard's
+/// focus is on the board.
+pub(super) fn show(ui: &mut egui::Ui, author: &mut Author, carried: Option<Carried>) -> bool {
     let (space, canvas) = ui.allocate_exact_size(ui.available_size().max(Vec2::splat(80.0)), Sense::click_and_drag());
     let board = Board::fitting(&author.scene().shelf, space);
     canvas.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, "Board from above"));
-    let focused = objects_for_keyboard(ui, author, &board) || canvas.has_focus();
-    if focused {
-        let focus = ui.memory(|memory| memory.focused());
-        ui.memory_mut(|memory| focus.map(|id| memory.set_focus_lock_filter(id, ARROWS)));
+    let has_focus = objects_for_keyboard(ui, author, &board) || canvas.has_focus();
+    if let Some(focus) = ui.memory(|memory| memory.focused()).filter(|_| has_focus) {
+        ui.memory_mut(|memory| memory.set_focus_lock_filter(focus, ARROWS));
     }
     pointer(ui, author, &board, &canvas);
     drop_class(author, &board, carried, space);
@@ -77,6 +77,7 @@ pub(super) fn show(ui: &mut egui::Ui, author: &mut Author, carried: Option<Carri
         draw::hint(&painter, &ink, board.rect, "An empty shelf", "Add a class from the left, drag one here, or generate objects");
     }
     tooltip(canvas, author, hovered);
+    has_focus
 }
 
 /// Every object as something that the keyboard and a screen reader can reach; choosing it is what focus does. Returns

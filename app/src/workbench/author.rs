@@ -21,7 +21,7 @@ pub use snap::{Snap, normal_angle, rounded};
 use super::latest::{Latest, Wake};
 use history::History;
 use nudge_core::camera::{ViewArray, hidden_objects_while};
-use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
+use nudge_core::scene::{Catalog, GenerateConfig, Object, Scene, Shelf, generate};
 use nudge_core::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -73,9 +73,11 @@ pub struct Author {
     plan: Plan,
     hidden: Hidden,
     count: Latest<BTreeSet<usize>>,
-    /// The scene that was asked about last.
-    asked: Option<Arc<Scene>>,
-    generator: Latest<Result<Scene>>,
+    /// The first count that is about the objects that are there now, at whatever places.
+    first_count: u64,
+    /// Number of objects that were counted last.
+    counted: usize,
+    generator: Latest<Result<Vec<Object>>>,
     /// The grid that positions snap to.
     pub snap: Snap,
     /// What *Generate* is asked for.
@@ -112,7 +114,8 @@ impl Author {
             plan: Plan::default(),
             hidden: Hidden::default(),
             count: Latest::new("hidden objects"),
-            asked: None,
+            first_count: 0,
+            counted: 0,
             generator: Latest::new("scene generator"),
             snap: Snap::default(),
             fill: FillForm::default(),
@@ -155,7 +158,7 @@ impl Author {
         self.history = History::default();
         self.selection.clear();
         self.gesture = None;
-        self.hidden = Hidden::default();
+        self.counted = usize::MAX;
         self.changed();
         self.count.hurry();
     }
@@ -263,7 +266,7 @@ impl Author {
 
     /// Takes in what was done in the background.
     pub fn poll(&mut self) {
-        if let Some((_, objects)) = self.count.take() {
+        if let Some((_, objects)) = self.count.take().filter(|(number, _)| *number >= self.first_count) {
             self.hidden.objects = Some(objects);
             self.hidden.is_stale = self.count.is_busy();
         }
@@ -275,7 +278,10 @@ impl Author {
         let FillForm { fill, rho, seed } = self.fill;
         let config = GenerateConfig { fill: [fill, fill], rho, ..GenerateConfig::around(&self.scene) };
         let catalog = self.catalog.clone();
-        self.generator.ask(move |_| Some(generate(&catalog, &config, seed)));
+        self.generator.ask(move |_| {
+            let kept = config.keep.len();
+            Some(generate(&catalog, &config, seed).map(|scene| scene.objects.into_iter().skip(kept).collect()))
+        });
         self.fill.seed = seed.wrapping_add(1);
     }
 
@@ -292,10 +298,7 @@ impl Author {
     /// Takes in generated objects, as one step; returns how many there are, or why there are none.
     pub fn poll_generated(&mut self) -> Option<Result<usize>> {
         let (_, answer) = self.generator.take()?;
-        Some(answer.map(|generated| {
-            let kept = generated.objects.iter().zip(&self.scene.objects).take_while(|(a, b)| a == b).count();
-            // What was moved while the generator ran has kept its place in the list.
-            let new: Vec<_> = generated.objects.into_iter().skip(kept.max(self.scene.objects.len())).collect();
+        Some(answer.map(|new| {
             let count = new.len();
             self.edit(Edit::Once, |scene| scene.objects.extend(new));
             count
@@ -306,18 +309,24 @@ impl Author {
     fn changed(&mut self) {
         self.selection.retain(|at| *at < self.scene.objects.len());
         self.plan = Plan::of(&self.scene, &self.catalog);
-        if self.asked.as_ref().is_some_and(|asked| asked.objects.len() != self.scene.objects.len()) {
-            // Positions in the list no longer mean the same objects.
-            self.hidden.objects = None;
+        let count = self.scene.objects.len();
+        let is_other = std::mem::replace(&mut self.counted, count) != count;
+        if count == 0 {
+            self.count.forget();
+            self.hidden = Hidden { objects: Some(BTreeSet::new()), is_stale: false };
+            return;
         }
-        let scene = Arc::new(self.scene.clone());
-        self.asked = Some(scene.clone());
         self.hidden.is_stale = true;
-        let catalog = self.catalog.clone();
-        self.count.ask(move |waiting| {
+        let (scene, catalog) = (self.scene.clone(), self.catalog.clone());
+        let number = self.count.ask(move |waiting| {
             let bodies = scene.bodies(&catalog).ok()?;
             let hidden = hidden_objects_while(&scene.shelf, &bodies, VIEW_ARRAY.as_ref()?, || waiting.go_on())?;
             Some(hidden.into_iter().map(|id| usize::from(id.0)).collect())
         });
+        if is_other {
+            // Positions in the list no longer mean the same objects.
+            self.hidden.objects = None;
+            self.first_count = number;
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The floor plan of a scene in the making: where every object stands, what is wrong with it, and where there is room.
 
-use nudge_core::scene::{Catalog, Object, Problem, Scene, outline};
+use nudge_core::scene::{Catalog, Problem, Scene, outline};
 use std::collections::BTreeMap;
 
 /// Gap that is left around an object that is put where there is room, metres.
@@ -35,7 +35,7 @@ impl Plan {
             .map(|(body, object)| outline::placed(&body.solid.footprint(), object.position, object.yaw_deg))
             .collect();
         let mut plan = Self { outlines, ..Self::default() };
-        let mut add = |at: u16, words: String| plan.problems.entry(at.into()).or_insert_with(Vec::new).push(words);
+        let mut add = |at: u16, words: String| plan.problems.entry(at.into()).or_default().push(words);
         for problem in scene.problems(catalog).unwrap_or_default() {
             match problem {
                 Problem::Outside { object, message } => add(object, message),
@@ -106,7 +106,7 @@ impl Plan {
 
 /// An object's name as scorers and messages write it: `tomato_can#3`.
 pub fn name(scene: &Scene, at: usize) -> String {
-    let class = scene.objects.get(at).map_or("object", |object: &Object| object.class.as_str());
+    let class = scene.objects.get(at).map_or("object", |object| object.class.as_str());
     format!("{class}#{at}")
 }
 

@@ -98,9 +98,12 @@ fn cards(ui: &mut egui::Ui, browser: &mut Browser, chosen: &mut Option<PathBuf>,
         ui.add_space(20.0);
         ui.vertical_centered(|ui| ui.weak(format!("Nothing matches “{}”", browser.search.trim())));
     }
-    for group in shown.chunk_by(|a, b| browser.entries()[*a].group == browser.entries()[*b].group) {
+    let group = |at: &usize| browser.entries()[*at].group.clone();
+    let groups: Vec<(String, Vec<usize>)> =
+        shown.chunk_by(|a, b| group(a) == group(b)).map(|chunk| (group(&chunk[0]), chunk.to_vec())).collect();
+    for (title, group) in groups {
         ui.add_space(6.0);
-        ui.strong(browser.entries()[group[0]].group.as_str());
+        ui.strong(title);
         ui.add_space(2.0);
         for row in group.chunks(columns as usize) {
             ui.horizontal(|ui| {

@@ -161,8 +161,15 @@ fn object(ui: &mut egui::Ui, author: &mut Author, at: usize) {
 fn hidden(ui: &mut egui::Ui, author: &mut Author) {
     let total = author.scene().objects.len();
     let hidden = author.hidden().clone();
+    if total == 0 {
+        ui.weak("No objects yet");
+        return;
+    }
     let Some(objects) = &hidden.objects else {
-        ui.weak(if total == 0 { "No objects yet" } else { "Counting…" });
+        ui.horizontal(|ui| {
+            ui.weak("Counting");
+            ui.spinner();
+        });
         return;
     };
     ui.horizontal(|ui| {
@@ -237,8 +244,9 @@ fn generate(ui: &mut egui::Ui, author: &mut Author) {
         ui.label("Fill").on_hover_text("Share of the floor that objects shall cover, those that are there included");
         let mut percent = 100.0 * author.fill.fill;
         let slider = egui::Slider::new(&mut percent, 5.0..=60.0).fixed_decimals(0).suffix(" %");
-        named(ui.add(slider), "Fill");
-        author.fill.fill = percent / 100.0;
+        if named(ui.add(slider), "Fill").changed() {
+            author.fill.fill = percent / 100.0;
+        }
         ui.end_row();
         ui.label("Regularity").on_hover_text("0 places freely, 1 lines objects up behind each other");
         named(ui.add(egui::Slider::new(&mut author.fill.rho, 0.0..=1.0).fixed_decimals(1)), "Regularity");

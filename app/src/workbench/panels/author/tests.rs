@@ -18,8 +18,7 @@ fn harness(model: Model) -> Harness<'static, Stage> {
     harness
 }
 
-fn author(harness: &Harness<'_, Stage>) -> &Author {
-    // Reading through a shared borrow keeps the tests short.
+fn author<'a>(harness: &'a Harness<'_, Stage>) -> &'a Author {
     &harness.state().model.author
 }
 

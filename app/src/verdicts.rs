@@ -50,5 +50,4 @@ pub fn verdict_title(verdict: Verdict) -> &'static str {
 }
 
 /// All verdicts, in the order of tables.
-pub const VERDICTS: [Verdict; 4] =
-    [Verdict::Found, Verdict::Misclassified, Verdict::NotFound, Verdict::Hallucinated];
+pub const VERDICTS: [Verdict; 4] = [Verdict::Found, Verdict::Misclassified, Verdict::NotFound, Verdict::Hallucinated];

@@ -64,7 +64,8 @@ fn an_episode_stored_at_once_is_the_one_written_step_by_step() {
     EpisodeDir::store(&at_once, &synthetic::record(3), states()).expect("stored");
     let content = |path: &Path| -> Vec<Vec<u8>> { snapshot(path).into_values().collect() };
     assert!(content(&stepwise) == content(&at_once));
-    let error = EpisodeDir::store(root.path().join("c"), &synthetic::record(2), states()).expect_err("a state too many");
+    let error =
+        EpisodeDir::store(root.path().join("c"), &synthetic::record(2), states()).expect_err("a state too many");
     assert_eq!(error.to_string(), "4 states for 2 steps");
     assert!(EpisodeDir::open(root.path().join("c")).is_err(), "not an episode");
 }

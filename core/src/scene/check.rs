@@ -43,9 +43,10 @@ pub enum Problem {
 
 /// Everything that is wrong with where bodies stand: first what stands outside, then what overlaps.
 pub(super) fn problems(shelf: &Shelf, bodies: &[Body]) -> impl Iterator<Item = Problem> {
-    let outside = bodies.iter().enumerate().filter_map(|(at, body)| {
-        outside(shelf, body).map(|message| Problem::Outside { object: at as u16, message })
-    });
+    let outside = bodies
+        .iter()
+        .enumerate()
+        .filter_map(|(at, body)| outside(shelf, body).map(|message| Problem::Outside { object: at as u16, message }));
     let overlaps = std::iter::once_with(|| bodies.iter().map(PlacedBody::new).collect::<Vec<_>>()).flat_map(|placed| {
         let mut found = Vec::new();
         for (at, body) in placed.iter().enumerate() {

@@ -60,20 +60,16 @@ impl Plan {
     pub fn within(&self, a: [f32; 2], b: [f32; 2]) -> impl Iterator<Item = usize> {
         let inside =
             move |p: &[f32; 2]| (0..2).all(|axis| (a[axis].min(b[axis])..=a[axis].max(b[axis])).contains(&p[axis]));
-        let found = self.outlines.iter().enumerate().filter(move |(_, outline)| {
-            !outline.is_empty() && outline.iter().all(inside)
-        });
+        let found = self
+            .outlines
+            .iter()
+            .enumerate()
+            .filter(move |(_, outline)| !outline.is_empty() && outline.iter().all(inside));
         found.map(|(at, _)| at)
     }
 
     /// The place nearest to `near` where a footprint (at yaw 0 about the origin) has room when turned by `yaw_deg`.
-    pub fn room_for(
-        &self,
-        scene: &Scene,
-        footprint: &[[f32; 2]],
-        yaw_deg: f32,
-        near: [f32; 2],
-    ) -> Option<[f32; 2]> {
+    pub fn room_for(&self, scene: &Scene, footprint: &[[f32; 2]], yaw_deg: f32, near: [f32; 2]) -> Option<[f32; 2]> {
         let turned = outline::placed(footprint, [0.0, 0.0], yaw_deg);
         let reach = radius(&turned, [0.0, 0.0]);
         let (min, max) = (scene.shelf.min(), scene.shelf.max());

@@ -119,7 +119,8 @@ fn added_and_duplicated_objects_find_room_and_positions_stay_short_in_files() {
         author.nudge([1.0, 0.0]);
     }
     let toml = author.scene().to_toml();
-    let long = toml.lines().find(|line| line.starts_with("position") && line.len() > "position = [-0.1234, 0.1234]".len());
+    let long =
+        toml.lines().find(|line| line.starts_with("position") && line.len() > "position = [-0.1234, 0.1234]".len());
     assert_eq!(long, None);
 }
 

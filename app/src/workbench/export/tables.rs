@@ -29,7 +29,11 @@ impl Table {
 
 /// A field as CSV writes it.
 fn quoted(field: &str) -> String {
-    if field.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
+    if field.contains(['"', ',', '\n', '\r']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field.to_owned()
+    }
 }
 
 fn steps(session: &Session) -> impl Iterator<Item = (&Moment, &StepOutcome)> {
@@ -145,8 +149,7 @@ pub fn decisions_csv(session: &Session) -> String {
 
 /// What became of each object, by step.
 pub fn verdicts_csv(session: &Session) -> String {
-    let mut table =
-        Table::new(&["step", "object", "class", "x_m", "y_m", "scorer_says", "verdict", "overruled"]);
+    let mut table = Table::new(&["step", "object", "class", "x_m", "y_m", "scorer_says", "verdict", "overruled"]);
     for (moment, outcome) in steps(session) {
         for judged in session.annotations.judge(moment.step, &outcome.record.objects) {
             let [x, y] = judged.proposed.position;

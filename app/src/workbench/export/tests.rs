@@ -43,7 +43,8 @@ fn read_csv(text: &str) -> Vec<Vec<String>> {
 #[test]
 fn tables_parse_back_with_one_width_and_the_numbers_of_the_episode() {
     let session = annotated();
-    let column = |rows: &[Vec<String>], name: &str| rows[0].iter().position(|heading| heading == name).expect("heading");
+    let column =
+        |rows: &[Vec<String>], name: &str| rows[0].iter().position(|heading| heading == name).expect("heading");
     for text in [scores_csv(&session), decisions_csv(&session), verdicts_csv(&session)] {
         let rows = read_csv(&text);
         assert!(rows.len() > 3 && rows.iter().all(|row| row.len() == rows[0].len()), "{text}");
@@ -130,7 +131,8 @@ fn contains_text(path: &Path, needle: &str) -> bool {
 fn verify(recording: &Path) {
     let Some(venv) = std::env::var_os("NUDGE_VENV") else { return };
     let rerun = Path::new(&venv).join("bin").join("rerun");
-    let output = std::process::Command::new(rerun).args(["rrd", "verify"]).arg(recording).output().expect("rerun starts");
+    let output =
+        std::process::Command::new(rerun).args(["rrd", "verify"]).arg(recording).output().expect("rerun starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 

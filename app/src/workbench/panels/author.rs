@@ -4,9 +4,9 @@
 mod canvas;
 mod palette;
 mod properties;
-mod toolbar;
 #[cfg(test)]
 mod tests;
+mod toolbar;
 
 use crate::workbench::author::{Author, Choose};
 use crate::workbench::command::{Command, Level, MenuCommand};
@@ -22,7 +22,9 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     author.wake_with(Arc::new(move || context.request_repaint()));
     author.poll();
     match author.poll_generated() {
-        Some(Ok(0)) => ask.push(Command::Tell(Level::Warning, "Nothing was added: the shelf is full enough".to_owned())),
+        Some(Ok(0)) => {
+            ask.push(Command::Tell(Level::Warning, "Nothing was added: the shelf is full enough".to_owned()))
+        }
         Some(Ok(count)) => ask.push(Command::Tell(Level::Info, format!("{count} objects added"))),
         Some(Err(error)) => ask.push(Command::Tell(Level::Error, error.to_string())),
         None => {}

@@ -27,7 +27,9 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     browser.poll(&kept.recent, &wake);
     head(ui, browser, &wake, ask);
     ui.separator();
-    egui::Panel::bottom("scenes start").show_separator_line(true).show(ui, |ui| foot(ui, kept.form.scene.as_deref(), ask));
+    egui::Panel::bottom("scenes start")
+        .show_separator_line(true)
+        .show(ui, |ui| foot(ui, kept.form.scene.as_deref(), ask));
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         if browser.entries().is_empty() {
             empty(ui, browser);
@@ -63,7 +65,8 @@ fn foot(ui: &mut egui::Ui, chosen: Option<&Path>, ask: &mut Vec<Command>) {
     ui.add_space(4.0);
     ui.horizontal(|ui| {
         let start = named(ui.add_enabled(chosen.is_some(), egui::Button::new("▶ Start")), "Start");
-        let start = start.on_hover_text("Start an episode of the chosen scene").on_disabled_hover_text("Choose a scene");
+        let start =
+            start.on_hover_text("Start an episode of the chosen scene").on_disabled_hover_text("Choose a scene");
         if start.clicked() {
             ask.push(Command::Start);
         }

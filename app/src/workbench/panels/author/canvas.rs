@@ -74,7 +74,13 @@ pub(super) fn show(ui: &mut egui::Ui, author: &mut Author, carried: Option<Carri
     ghost(&painter, &ink, author, &board, carried, space);
     readout(&painter, &ink, author, &board, canvas.hover_pos(), space);
     if author.scene().objects.is_empty() && carried.is_none() {
-        draw::hint(&painter, &ink, board.rect, "An empty shelf", "Add a class from the left, drag one here, or generate objects");
+        draw::hint(
+            &painter,
+            &ink,
+            board.rect,
+            "An empty shelf",
+            "Add a class from the left, drag one here, or generate objects",
+        );
     }
     tooltip(canvas, author, hovered);
     has_focus
@@ -188,14 +194,7 @@ fn drop_class(author: &mut Author, board: &Board, carried: Option<Carried>, spac
 }
 
 /// The class that is carried, where it would come to stand.
-fn ghost(
-    painter: &egui::Painter,
-    ink: &Ink,
-    author: &Author,
-    board: &Board,
-    carried: Option<Carried>,
-    space: Rect,
-) {
+fn ghost(painter: &egui::Painter, ink: &Ink, author: &Author, board: &Board, carried: Option<Carried>, space: Rect) {
     let Some(Carried { class, at, is_let_go: false }) = carried else { return };
     let class = author.catalog().class(class);
     let position = board.board(at);

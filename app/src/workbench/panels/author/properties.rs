@@ -261,7 +261,11 @@ fn generate(ui: &mut egui::Ui, author: &mut Author) {
             if ui.button("Cancel").on_hover_text("Leave the scene as it is").clicked() {
                 author.cancel_generating();
             }
-        } else if ui.button("Generate").on_hover_text("Fill the shelf around what stands there; undo takes it back").clicked() {
+        } else if ui
+            .button("Generate")
+            .on_hover_text("Fill the shelf around what stands there; undo takes it back")
+            .clicked()
+        {
             author.generate();
         }
     });

@@ -70,7 +70,8 @@ fn edits(ui: &mut egui::Ui, author: &mut Author) {
     }
     ui.separator();
     let any = !author.selection().is_empty();
-    if button(ui, any, "Rotate", Some(ROTATE)).on_hover_text("Turn by 15° counter-clockwise; with shift back").clicked() {
+    if button(ui, any, "Rotate", Some(ROTATE)).on_hover_text("Turn by 15° counter-clockwise; with shift back").clicked()
+    {
         author.turn(1.0);
     }
     if button(ui, any, "Duplicate", Some(DUPLICATE)).on_hover_text("Copy to the nearest place with room").clicked() {

@@ -61,7 +61,15 @@ fn a_note_is_kept_letter_by_letter_and_listed() {
 #[test]
 fn an_overruled_verdict_is_marked_and_counted() {
     let mut harness = harness();
-    let objects = harness.state().model.moment().and_then(|moment| moment.outcome.clone()).expect("a step").record.objects.clone();
+    let objects = harness
+        .state()
+        .model
+        .moment()
+        .and_then(|moment| moment.outcome.clone())
+        .expect("a step")
+        .record
+        .objects
+        .clone();
     let wrong = objects.iter().find(|object| object.verdict != Verdict::Found).expect("one that was not found");
     let found = objects.iter().filter(|object| object.verdict == Verdict::Found).count();
     assert!(has(&harness, &format!("{found} found")));

@@ -1,7 +1,7 @@
 //! How the board and what stands on it look.
 
-use super::Board;
 use super::super::colour;
+use super::Board;
 use crate::workbench::author::{Author, Gesture};
 use nudge_core::scene::Shelf;
 use rerun::external::egui::{
@@ -267,8 +267,7 @@ pub(super) fn handle(painter: &Painter, ink: &Ink, from: Pos2, at: Pos2, radius:
     painter.line_segment([from + (at - from).normalized() * 4.0, at], Stroke::new(1.2, ink.accent.gamma_multiply(0.7)));
     painter.circle(at, radius, ink.board, Stroke::new(2.0, ink.accent));
     // An arrow that runs most of the way around.
-    let arc: Vec<Pos2> =
-        (0..=9).map(|i| at + Vec2::angled(0.4 + i as f32 * 0.5) * (radius - 3.6)).collect();
+    let arc: Vec<Pos2> = (0..=9).map(|i| at + Vec2::angled(0.4 + i as f32 * 0.5) * (radius - 3.6)).collect();
     let tip = arc[arc.len() - 1];
     painter.line(arc, Stroke::new(1.2, ink.accent));
     painter.circle_filled(tip, 1.5, ink.accent);

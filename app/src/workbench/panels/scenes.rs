@@ -3,10 +3,11 @@
 #[cfg(test)]
 mod tests;
 
+use crate::workbench::author::Author;
 use crate::workbench::browser::{Browser, Entry, Look};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::latest::Wake;
-use crate::workbench::model::Model;
+use crate::workbench::model::{LayoutKind, Model};
 use rerun::external::egui::{self, Color32, FontId, Pos2, Rect, Sense, StrokeKind, Vec2, WidgetInfo, WidgetType};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,13 +24,13 @@ const TEXT_HEIGHT: f32 = 74.0;
 pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     let context = ui.ctx().clone();
     let wake: Wake = Arc::new(move || context.request_repaint());
-    let Model { browser, kept, .. } = model;
+    let Model { browser, kept, author, .. } = model;
     browser.poll(&kept.recent, &wake);
     head(ui, browser, &wake, ask);
     ui.separator();
-    egui::Panel::bottom("scenes start")
-        .show_separator_line(true)
-        .show(ui, |ui| foot(ui, kept.form.scene.as_deref(), ask));
+    let chosen = kept.form.scene.as_deref();
+    let bottom = egui::Panel::bottom("scenes start").show_separator_line(true);
+    bottom.show(ui, |ui| foot(ui, chosen, author, ask));
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         if browser.entries().is_empty() {
             empty(ui, browser);
@@ -61,7 +62,7 @@ fn head(ui: &mut egui::Ui, browser: &mut Browser, wake: &Wake, ask: &mut Vec<Com
     });
 }
 
-fn foot(ui: &mut egui::Ui, chosen: Option<&Path>, ask: &mut Vec<Command>) {
+fn foot(ui: &mut egui::Ui, chosen: Option<&Path>, author: &mut Author, ask: &mut Vec<Command>) {
     ui.add_space(4.0);
     ui.horizontal(|ui| {
         let start = named(ui.add_enabled(chosen.is_some(), egui::Button::new("▶ Start")), "Start");
@@ -70,12 +71,32 @@ fn foot(ui: &mut egui::Ui, chosen: Option<&Path>, ask: &mut Vec<Command>) {
         if start.clicked() {
             ask.push(Command::Start);
         }
+        let edit = ui.add_enabled(chosen.is_some(), egui::Button::new("Edit"));
+        let edit = edit.on_hover_text("Open the chosen scene in Author").on_disabled_hover_text("Choose a scene");
+        if let Some(path) = chosen.filter(|_| edit.clicked()) {
+            open_in_author(path, author, ask);
+        }
         match chosen {
             Some(path) => ui.label(path.display().to_string()),
             None => ui.weak("Choose a scene; a double click starts it"),
         };
     });
     ui.add_space(2.0);
+}
+
+fn open_in_author(path: &Path, author: &mut Author, ask: &mut Vec<Command>) {
+    if author.is_unsaved() {
+        let words = format!("{} has changes: save or undo them in Author first", author.scene().name);
+        ask.push(Command::Tell(Level::Warning, words));
+        return ask.push(Command::Layout(LayoutKind::Author));
+    }
+    match author.open(path) {
+        Ok(warnings) => {
+            ask.extend(warnings.into_iter().map(|warning| Command::Tell(Level::Warning, warning)));
+            ask.push(Command::Layout(LayoutKind::Author));
+        }
+        Err(error) => ask.push(Command::Tell(Level::Error, error.to_string())),
+    }
 }
 
 fn empty(ui: &mut egui::Ui, browser: &Browser) {

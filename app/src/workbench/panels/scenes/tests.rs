@@ -66,6 +66,10 @@ fn scenes_are_found_looked_at_and_chosen_and_a_broken_one_says_why() {
     harness.get_by_label("Start").click();
     harness.run_steps(2);
     assert!(matches!(harness.state().asked[..], [.., Command::Start]));
+    harness.get_by_label("Edit").click();
+    harness.run_steps(2);
+    assert!(matches!(harness.state().asked[..], [.., Command::Layout(LayoutKind::Author)]));
+    assert_eq!(harness.state().model.author.scene().name, "beta");
 }
 
 #[test]

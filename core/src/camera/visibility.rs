@@ -101,8 +101,14 @@ fn count_pixels(
     let [near, far] = camera.depth_range_m;
     let in_range = (1.0 / far)..=(1.0 / near);
     let mut counts = vec![0; bodies.len()];
-    // A few bodies are looked for within their own outlines; many are counted in one pass over the image.
-    if wanted.len() > 4 {
+    let outline = |body: usize| {
+        let parts = scene.parts.iter().filter(|part| usize::from(part.tag) == body).map(|part| part.rect.clone());
+        parts.reduce(|a, b| a.union(&b))
+    };
+    let outlines: Vec<(usize, Rect)> = wanted.iter().filter_map(|&body| Some((body, outline(body)?))).collect();
+    let area: usize = outlines.iter().map(|(_, Rect { columns, rows })| columns.len() * rows.len()).sum();
+    // Each body within its own outline, unless that is more work than one pass over the image.
+    if area > camera.width * camera.height / 2 {
         for at in 0..camera.height {
             scene.scan(at, 0..camera.width, &mut row);
             for (tag, depth) in row.tag.iter().zip(&row.inverse_depth) {
@@ -112,9 +118,7 @@ fn count_pixels(
             }
         }
     } else {
-        for &body in wanted {
-            let outline = scene.parts.iter().filter(|part| usize::from(part.tag) == body).map(|part| part.rect.clone());
-            let Some(Rect { columns, rows }) = outline.reduce(|a, b| a.union(&b)) else { continue };
+        for (body, Rect { columns, rows }) in outlines {
             for at in rows {
                 scene.scan(at, columns.clone(), &mut row);
                 let shows = |column: &usize| {

@@ -12,5 +12,6 @@ pub mod figure;
 mod fixture;
 pub mod picture;
 pub mod record;
+pub mod verdicts;
 #[cfg(feature = "workbench")]
 pub mod workbench;

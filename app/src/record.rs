@@ -12,13 +12,15 @@ pub(crate) mod decision;
 mod floor;
 pub(crate) mod layout;
 pub mod paths;
+mod remarks;
 pub(crate) mod shapes;
 pub(crate) mod voxels;
 
 use crate::picture;
+use crate::verdicts::Judged;
 use nudge_core::belief::{Belief, PushPrediction};
 use nudge_core::camera::{Image, View, ViewArray};
-use nudge_core::episode::{Episode, StepOutcome, StepRecord};
+use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
 use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
 use nudge_core::grid::Grid;
 use nudge_core::plan::Action;
@@ -81,12 +83,15 @@ pub struct Recorder {
 impl Recorder {
     /// Starts `path` (an `.rrd` file, overwritten) with the layout and everything that does not change.
     pub fn create(path: &Path, episode: &Episode) -> Result<Self> {
-        let record = episode.record();
-        let stream = file_stream(path, &format!("{} seed {}", record.scene.name, record.config.seed))?;
-        let recorder = Self::bare(stream, "", path);
-        let plan = picture::FloorPlan::of(&record.scene.grid());
+        Self::begin(path, &title(episode.record()), &setting(episode))
+    }
+
+    /// The same for an episode of which only the states are at hand: [`Recorder::record`] writes them one by one.
+    pub fn begin(path: &Path, name: &str, setting: &Setting<'_>) -> Result<Self> {
+        let recorder = Self::bare(file_stream(path, name)?, "", path);
+        let plan = picture::FloorPlan::of(&setting.shelf.grid());
         recorder.check(layout::standard("", plan).send(&recorder.stream, APPLICATION))?;
-        recorder.set_up(&setting(episode))?;
+        recorder.set_up(setting)?;
         Ok(recorder)
     }
 
@@ -114,20 +119,36 @@ impl Recorder {
     /// Records the state before the first step.
     pub fn prior(&mut self, episode: &Episode) -> Result<()> {
         let bodies = episode.bodies();
-        self.state(&setting(episode), &state(episode, &bodies))?;
-        self.field = Some(GainField::new(episode.belief()));
-        self.note(format!("prior: {}", decision::scores_line(&episode.record().prior)), rerun::TextLogLevel::INFO)?;
-        self.flush()
+        self.record(&setting(episode), &state(episode, &bodies), None)?;
+        self.remark(None, &[])
     }
 
     /// Records a step: what was weighed, what was done, and the state after it.
     pub fn step(&mut self, episode: &Episode, outcome: &StepOutcome) -> Result<()> {
-        let setting = setting(episode);
-        let nats = self.gain_of_voxels(&setting, outcome);
         let bodies = episode.bodies();
-        self.state(&setting, &state(episode, &bodies))?;
-        self.outcome(&setting, episode.belief(), outcome, &nats)?;
-        self.field = Some(GainField::new(episode.belief()));
+        self.record(&setting(episode), &state(episode, &bodies), Some(outcome))?;
+        self.remark(None, &Judged::by_scorer(&outcome.record.objects))
+    }
+
+    /// Records a state with what led to it: without an outcome the prior. States come in the order of their steps.
+    pub fn record(&mut self, setting: &Setting<'_>, state: &State<'_>, outcome: Option<&StepOutcome>) -> Result<()> {
+        let nats = outcome.map_or_else(Vec::new, |outcome| self.gain_of_voxels(setting, outcome));
+        self.state(setting, state)?;
+        match outcome {
+            Some(outcome) => self.outcome(setting, state.belief, outcome, &nats)?,
+            None => {
+                let line = format!("prior: {}", decision::scores_line(state.scores));
+                self.note(line, rerun::TextLogLevel::INFO)?;
+            }
+        }
+        self.field = Some(GainField::new(state.belief));
+        self.flush()
+    }
+
+    /// Records what is said about the state that was recorded last: a person's note, and the verdicts on its objects.
+    pub fn remark(&self, note: Option<&str>, verdicts: &[Judged]) -> Result<()> {
+        self.log(paths::NOTES, &rerun::TextDocument::from_markdown(remarks::note_page(note)))?;
+        self.log(paths::VERDICTS, &rerun::TextDocument::from_markdown(remarks::verdict_page(verdicts)))?;
         self.flush()
     }
 
@@ -320,6 +341,11 @@ impl Recorder {
     fn check<T>(&self, result: std::result::Result<T, impl std::fmt::Display>) -> Result<T> {
         result.map_err(|error| Error::io(&self.file, std::io::Error::other(error.to_string())))
     }
+}
+
+/// How a recording is named: `tunnel seed 3`.
+pub fn title(record: &EpisodeRecord) -> String {
+    format!("{} seed {}", record.scene.name, record.config.seed)
 }
 
 /// A stream into a file of its own.

@@ -13,7 +13,7 @@ mod visibility;
 pub use noise::NoiseModel;
 pub use project::project;
 pub use render::render;
-pub use visibility::{ObjectVisibility, UNSEEN_PX, hidden_count, hidden_objects, visibility};
+pub use visibility::{ObjectVisibility, UNSEEN_PX, hidden_count, hidden_objects, hidden_objects_while, visibility};
 
 use crate::grid::VoxelSet;
 use crate::{Point, Pose, Vector};

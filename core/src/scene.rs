@@ -18,7 +18,7 @@ mod file_tests;
 
 pub use body::{Body, ObjectId, Shelf};
 pub use catalog::{BACKGROUND, Background, CLASS_COUNT, Catalog, Class, ClassId, OBJECT_CLASS_COUNT};
-pub use check::{MAX_OBJECTS, MAX_VOXELS};
+pub use check::{MAX_OBJECTS, MAX_VOXELS, Problem};
 pub use file::FORMAT;
 pub use generate::{GenerateConfig, generate};
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
@@ -150,6 +150,14 @@ impl Scene {
             });
         }
         Ok(bodies)
+    }
+
+    /// Everything that is wrong with where the objects stand, for a scene that is being made. A checked scene has none.
+    ///
+    /// # Errors
+    /// For objects that have no body: of an unknown class, of a mesh that is not there.
+    pub fn problems(&self, catalog: &Catalog) -> Result<Vec<Problem>> {
+        Ok(check::problems(&self.shelf, &self.bodies(catalog)?).collect())
     }
 
     /// Share of the floor that the objects' footprints cover.

@@ -69,8 +69,11 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
         (1.0, flat("Depth", paths::OBSERVATION_DEPTH)),
         (1.4, flat("Gain of views by target", paths::GAIN_VIEWS)),
     ]);
+    let page = |name: &str, path: &str| Part::View(View::new("TextDocument", name, &at(path), [at(path)]));
     let words = Part::Tabs(vec![
-        Part::View(View::new("TextDocument", "Decision", &at(paths::DECISION), [at(paths::DECISION)])),
+        page("Decision", paths::DECISION),
+        page("Verdicts", paths::VERDICTS),
+        page("Notes", paths::NOTES),
         Part::View(View::new("TextLog", "Log", &at(paths::LOG), [at(paths::LOG)])),
     ]);
     let curves = |name: &str, corner: bpc::Corner2D, keys: &[&str]| {

@@ -64,6 +64,10 @@ pub const ERROR_OCCUPANCY: &str = "error/occupancy";
 pub const ERROR_SEMANTICS: &str = "error/semantics";
 /// What was weighed, chosen, and why.
 pub const DECISION: &str = "decision";
+/// What a person noted on the step.
+pub const NOTES: &str = "notes";
+/// What became of each object, and where a person overruled the scorer.
+pub const VERDICTS: &str = "verdicts";
 /// One line a step.
 pub const LOG: &str = "log";
 /// All scores.

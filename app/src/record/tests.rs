@@ -25,11 +25,7 @@ fn a_recording_stays_small_and_names_its_entities() {
         budget: steps,
         gamma: 0.2,
     };
-    let stream = file_stream(&path, "test").expect("file");
-    let mut recorder = Recorder::bare(stream, "", &path);
-    let plan = picture::FloorPlan::of(&played.record.scene.grid());
-    recorder.check(layout::standard("", plan).send(&recorder.stream, APPLICATION)).expect("layout");
-    recorder.set_up(&setting).expect("static part");
+    let mut recorder = Recorder::begin(&path, "test", &setting).expect("file");
     let mut sizes = Vec::new();
     for step in 0..=steps {
         let scores = step.checked_sub(1).map_or(&played.record.prior, |at| &played.record.steps[at].scores);
@@ -76,6 +72,8 @@ fn entities_are_named_as_the_contract_says() {
         (paths::PREDICTED_SEMANTICS, "predicted/semantics"),
         (paths::PREDICTED_CHANGE, "predicted/change"),
         (paths::DECISION, "decision"),
+        (paths::NOTES, "notes"),
+        (paths::VERDICTS, "verdicts"),
         (paths::LOG, "log"),
     ];
     for (name, contract) in names {

@@ -1,8 +1,10 @@
 //! What a person says about an episode: notes on its steps, and verdicts on its objects. `notes.json` in the episode's
 //! directory keeps them.
 
+pub use crate::verdicts::{Judged, VERDICTS, object_name, verdict_title};
+
 use nudge_core::files::write_atomically;
-use nudge_core::score::Verdict;
+use nudge_core::score::{ObjectVerdict, Verdict};
 use nudge_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -55,6 +57,17 @@ impl Annotations {
     pub fn write(&self, directory: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self).expect("annotations are plain data") + "\n";
         write_atomically(&directory.join(FILE), text.as_bytes())
+    }
+}
+
+impl Annotations {
+    /// The scorer's verdicts after a step with what a person made of them.
+    pub fn judge(&self, step: usize, proposed: &[ObjectVerdict]) -> Vec<Judged> {
+        let mut judged = Judged::by_scorer(proposed);
+        if let Some(overruled) = self.verdicts.get(&step) {
+            judged.iter_mut().for_each(|judged| judged.overruled = overruled.get(&judged.name).copied());
+        }
+        judged
     }
 }
 

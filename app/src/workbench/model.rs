@@ -2,6 +2,7 @@
 //! and no viewer in here, so that tests can look at all of it.
 
 use super::author::Author;
+use super::browser::Browser;
 use super::derive::Derived;
 use super::panels;
 use super::session::{Moment, Session, SessionId};
@@ -240,6 +241,8 @@ pub struct Model {
     pub slice_m: Option<f32>,
     /// The scene in the making.
     pub author: Author,
+    /// The scenes to choose from.
+    pub browser: Browser,
     /// Messages that fade.
     pub toasts: Toasts,
     /// What the panels remember from frame to frame.

@@ -4,14 +4,21 @@
 //! over, which row is chosen), and pushes onto `ask` what shall be done. What a panel remembers from frame to frame
 //! (textures, the order of a table) is its `State`, kept in [`State`] by the model.
 
+pub mod author;
 pub mod camera;
+pub mod clock;
 pub mod compare;
 pub mod curves;
 pub mod decision;
+pub mod display;
+pub mod episode;
 pub mod gains;
 pub mod maps;
+pub mod notes;
 pub mod push;
+pub mod scenes;
 pub mod why;
+pub mod windows;
 
 mod arrows;
 mod causes;

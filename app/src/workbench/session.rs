@@ -77,7 +77,8 @@ pub struct Setup {
     pub hidden: Arc<Vec<String>>,
 }
 
-/// An open episode.
+/// An open episode. Cheap to clone: its states are shared.
+#[derive(Clone)]
 pub struct Session {
     /// Its id.
     pub id: SessionId,

@@ -260,6 +260,9 @@ fn an_object_behind_a_wall_of_boxes_is_hidden() {
     let array = standard();
     assert_eq!(hidden_objects(&shelf(), &bodies, &array), vec![ObjectId(9)]);
     assert_eq!(hidden_count(&shelf(), &bodies, &array), 1);
+    let rounds = std::cell::Cell::new(0);
+    let twice = || rounds.replace(rounds.get() + 1) < 2;
+    assert_eq!(hidden_objects_while(&shelf(), &bodies, &array, twice), None, "given up after two rounds");
     let all = visibility(&shelf(), &bodies, &array);
     assert!(all[5].is_hidden() && all[5].object == ObjectId(9) && all[..5].iter().all(|v| v.most_px > 10_000));
     // The fast search and the full count agree, and the count is that of the image.

@@ -48,6 +48,16 @@ pub fn visibility(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<Obje
 /// The bodies that are unseen from every view of the array, in their order. The same answer as [`visibility`] gives, but
 /// a body is left out of the search as soon as a view has shown enough of it.
 pub fn hidden_objects(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<ObjectId> {
+    hidden_objects_while(shelf, bodies, array, || true).unwrap_or_default()
+}
+
+/// The same, given up as soon as `go_on`, asked between rounds of a few views, says no: `None` then.
+pub fn hidden_objects_while(
+    shelf: &Shelf,
+    bodies: &[Body],
+    array: &ViewArray,
+    go_on: impl Fn() -> bool,
+) -> Option<Vec<ObjectId>> {
     let mut unseen: Vec<usize> = (0..bodies.len()).collect();
     // Views that are far apart first: neighbours see the same things.
     let count = array.views.len();
@@ -55,6 +65,9 @@ pub fn hidden_objects(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<
     for round in 0..rounds {
         if unseen.is_empty() {
             break;
+        }
+        if !go_on() {
+            return None;
         }
         let views: Vec<&View> = array.views.iter().skip(round).step_by(rounds).collect();
         let counts: Vec<Vec<usize>> =
@@ -65,7 +78,7 @@ pub fn hidden_objects(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<
             counts.iter().all(|counts| counts[at - 1] < UNSEEN_PX)
         });
     }
-    unseen.into_iter().map(|at| bodies[at].id).collect()
+    Some(unseen.into_iter().map(|at| bodies[at].id).collect())
 }
 
 /// Number of bodies that are unseen from every view of the array.
@@ -88,8 +101,14 @@ fn count_pixels(
     let [near, far] = camera.depth_range_m;
     let in_range = (1.0 / far)..=(1.0 / near);
     let mut counts = vec![0; bodies.len()];
-    // A few bodies are looked for within their own outlines; many are counted in one pass over the image.
-    if wanted.len() > 4 {
+    let outline = |body: usize| {
+        let parts = scene.parts.iter().filter(|part| usize::from(part.tag) == body).map(|part| part.rect.clone());
+        parts.reduce(|a, b| a.union(&b))
+    };
+    let outlines: Vec<(usize, Rect)> = wanted.iter().filter_map(|&body| Some((body, outline(body)?))).collect();
+    let area: usize = outlines.iter().map(|(_, Rect { columns, rows })| columns.len() * rows.len()).sum();
+    // Each body within its own outline, unless that is more work than one pass over the image.
+    if area > camera.width * camera.height / 2 {
         for at in 0..camera.height {
             scene.scan(at, 0..camera.width, &mut row);
             for (tag, depth) in row.tag.iter().zip(&row.inverse_depth) {
@@ -99,9 +118,7 @@ fn count_pixels(
             }
         }
     } else {
-        for &body in wanted {
-            let outline = scene.parts.iter().filter(|part| usize::from(part.tag) == body).map(|part| part.rect.clone());
-            let Some(Rect { columns, rows }) = outline.reduce(|a, b| a.union(&b)) else { continue };
+        for (body, Rect { columns, rows }) in outlines {
             for at in rows {
                 scene.scan(at, columns.clone(), &mut row);
                 let shows = |column: &usize| {

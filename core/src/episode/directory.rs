@@ -123,6 +123,30 @@ impl EpisodeDir {
         Ok(directory)
     }
 
+    /// Files a whole episode at once in a new or empty directory, float16: `states` are belief and truth after every
+    /// number of actions, the prior first.
+    ///
+    /// # Errors
+    /// Those of [`create`](Self::create), and for states that do not go with the steps of the record.
+    pub fn store<'a>(
+        path: impl AsRef<Path>,
+        record: &EpisodeRecord,
+        states: impl IntoIterator<Item = (Belief, &'a TruthMap)>,
+    ) -> Result<Self> {
+        let directory = Self::create(path, Overwrite::Refuse)?;
+        let mut count = 0;
+        for (belief, truth) in states {
+            let has_new_truth = record.truth_index(count) == count;
+            directory.write_arrays(count, &belief, has_new_truth.then_some(truth))?;
+            count += 1;
+        }
+        if count != record.steps.len() + 1 {
+            return Err(Error::Usage(format!("{count} states for {} steps", record.steps.len())));
+        }
+        directory.write_document(record)?;
+        Ok(directory)
+    }
+
     /// Keeps beliefs with the given precision; float16 unless told.
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;

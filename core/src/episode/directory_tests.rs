@@ -55,6 +55,22 @@ fn what_was_written_is_read_back() {
 }
 
 #[test]
+fn an_episode_stored_at_once_is_the_one_written_step_by_step() {
+    let root = tempdir().expect("a temporary directory");
+    let (stepwise, at_once) = (root.path().join("a"), root.path().join("b"));
+    written(&stepwise, 3);
+    let truths: Vec<TruthMap> = [0, 0, 2, 2].map(synthetic::truth).into();
+    let states = || (0..=3).map(|index| (synthetic::belief(index), &truths[index]));
+    EpisodeDir::store(&at_once, &synthetic::record(3), states()).expect("stored");
+    let content = |path: &Path| -> Vec<Vec<u8>> { snapshot(path).into_values().collect() };
+    assert!(content(&stepwise) == content(&at_once));
+    let error =
+        EpisodeDir::store(root.path().join("c"), &synthetic::record(2), states()).expect_err("a state too many");
+    assert_eq!(error.to_string(), "4 states for 2 steps");
+    assert!(EpisodeDir::open(root.path().join("c")).is_err(), "not an episode");
+}
+
+#[test]
 fn single_precision_is_exact_and_half_is_not() {
     let root = tempdir().expect("a temporary directory");
     let directory =

@@ -20,6 +20,46 @@ const FAR_M: f32 = 100.0;
 /// Standing outside by this much, metres, is rounding.
 const ROUNDING_M: f32 = 0.000_5;
 
+/// What is wrong with where an object stands, by position in the scene's list.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Problem {
+    /// An object sticks out of the shelf.
+    Outside {
+        /// The object.
+        object: u16,
+        /// On which side, and by how much.
+        message: String,
+    },
+    /// Two objects take the same space.
+    Overlap {
+        /// The later one in the list.
+        object: u16,
+        /// The earlier one.
+        other: u16,
+        /// How deep, metres.
+        depth_m: f32,
+    },
+}
+
+/// Everything that is wrong with where bodies stand: first what stands outside, then what overlaps.
+pub(super) fn problems(shelf: &Shelf, bodies: &[Body]) -> impl Iterator<Item = Problem> {
+    let outside = bodies
+        .iter()
+        .enumerate()
+        .filter_map(|(at, body)| outside(shelf, body).map(|message| Problem::Outside { object: at as u16, message }));
+    let overlaps = std::iter::once_with(|| bodies.iter().map(PlacedBody::new).collect::<Vec<_>>()).flat_map(|placed| {
+        let mut found = Vec::new();
+        for (at, body) in placed.iter().enumerate() {
+            found.extend(placed[..at].iter().enumerate().filter_map(|(before, other)| {
+                let depth_m = body.overlap(other)?;
+                Some(Problem::Overlap { object: at as u16, other: before as u16, depth_m })
+            }));
+        }
+        found
+    });
+    outside.chain(overlaps)
+}
+
 pub(super) fn check(scene: &Scene, catalog: &Catalog, places: &Places) -> Result<Vec<Warning>> {
     check_name(scene, places)?;
     check_shelf(&scene.shelf, places)?;
@@ -34,19 +74,15 @@ pub(super) fn check(scene: &Scene, catalog: &Catalog, places: &Places) -> Result
         check_object(scene, catalog, at, object, places)?;
     }
     let bodies = scene.bodies_at(catalog, places)?;
-    for (at, body) in bodies.iter().enumerate() {
-        if let Some(message) = outside(&scene.shelf, body) {
-            return Err(places.object(scene, at, "position", message));
-        }
-    }
-    let placed: Vec<PlacedBody> = bodies.iter().map(PlacedBody::new).collect();
-    for (at, body) in placed.iter().enumerate() {
-        for (before, other) in placed[..at].iter().enumerate() {
-            if let Some(depth) = body.overlap(other) {
-                let message = format!("overlaps {} by {}", places.name_object(scene, before), millimetres(depth));
-                return Err(places.object(scene, at, "position", message));
+    if let Some(problem) = problems(&scene.shelf, &bodies).next() {
+        let (at, message) = match problem {
+            Problem::Outside { object, message } => (object, message),
+            Problem::Overlap { object, other, depth_m } => {
+                let other = places.name_object(scene, other.into());
+                (object, format!("overlaps {other} by {}", millimetres(depth_m)))
             }
-        }
+        };
+        return Err(places.object(scene, at.into(), "position", message));
     }
     let mut warnings = Vec::new();
     if scene.objects.is_empty() {

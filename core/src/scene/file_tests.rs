@@ -270,3 +270,21 @@ fn shipped_scenes_are_sound() {
         assert_eq!(file.file_stem().and_then(|stem| stem.to_str()), Some(scene.name.as_str()));
     }
 }
+
+#[test]
+fn problems_of_a_scene_in_the_making_are_all_told() {
+    let (mut scene, _) = parse(&format!("{HEAD}{}", object("tomato_can", "position = [0, 0.2]"))).expect("scene");
+    let catalog = Catalog::standard();
+    assert_eq!(scene.problems(&catalog).expect("bodies"), []);
+    scene.objects.push(Object::new("gum_tin", [0.06, 0.2], 0.0));
+    scene.objects.push(Object::new("milk_carton", [0.39, 0.01], 0.0));
+    let problems = scene.problems(&catalog).expect("bodies");
+    let [Problem::Outside { object: 2, message }, Problem::Overlap { object: 1, other: 0, depth_m }] = &problems[..]
+    else {
+        panic!("{problems:?}");
+    };
+    assert!(message.contains("at the front") || message.contains("on the right"), "{message}");
+    assert!((depth_m - 0.006).abs() < 0.000_1, "{depth_m}");
+    scene.objects.push(Object::new("spoon", [0.0, 0.0], 0.0));
+    assert!(scene.problems(&catalog).is_err());
+}

@@ -1,35 +1,45 @@
-# make demo · make test · make bench · make lint — each sets up what it needs, once.
+# make demo · make workbench · make test · make bench · make lint — each sets up what it needs, once.
 # Everything is built with one profile (release), in CARGO_TARGET_DIR if that is set, else in target/.
 export CARGO_TARGET_DIR ?= $(CURDIR)/target
 NUDGE := $(CARGO_TARGET_DIR)/release/nudge
 VENV  := $(CARGO_TARGET_DIR)/venv
+# The window with Rerun's viewer inside: about 1,000 crates. Without it the build is headless.
+WINDOW := --features nudge-tests/workbench
 
-.PHONY: help setup demo test bench lint python
+.PHONY: help setup graphics python demo workbench test bench lint
 help:
-	@echo 'make demo    map a crowded shelf: prints the table, writes out/demo/'
-	@echo 'make test    all tests'
-	@echo 'make bench   the speed of the parts that matter, beside their targets'
-	@echo 'make lint    formatting, clippy and documentation without warnings'
+	@echo 'make demo        map a crowded shelf: prints the table, writes out/demo/'
+	@echo 'make workbench   build and open the window (the first build takes about 45 minutes on two cores)'
+	@echo 'make test        all tests, those of the window too'
+	@echo 'make bench       the speed of the parts that matter, beside their targets'
+	@echo 'make lint        formatting, clippy and documentation without warnings'
 
 setup:
 	@scripts/setup.sh build
+
+graphics: setup
+	@scripts/setup.sh graphics
 
 python: setup
 	@scripts/setup.sh python $(VENV)
 
 demo: setup
 	cargo build --release --locked --workspace
-	$(NUDGE) run scenes/high/box-wall.toml --policy mem --budget 20 --seed 0 --out out/demo --force
+	$(NUDGE) run scenes/high/key-blocker.toml --policy mem --budget 20 --seed 0 --out out/demo --force
 
-test: setup python
-	cargo build --release --locked --workspace
-	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace
+workbench: graphics
+	cargo build --release --locked --workspace $(WINDOW)
+	$(NUDGE)
 
-bench: setup
-	cargo build --release --locked --workspace
-	cargo bench --locked --workspace --bench '*'
+test: graphics python
+	cargo build --release --locked --workspace $(WINDOW)
+	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace $(WINDOW)
 
-lint: setup
+bench: graphics
+	cargo build --release --locked --workspace $(WINDOW)
+	cargo bench --locked --workspace $(WINDOW) --bench '*'
+
+lint: graphics
 	cargo fmt --all --check
-	cargo clippy --release --locked --workspace --all-targets -- -D warnings
-	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps
+	cargo clippy --release --locked --workspace --all-targets $(WINDOW) -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps $(WINDOW)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs what a bare Debian lacks. `setup.sh build`: the C compiler that some crates need. `setup.sh python DIR`: a
-# virtual environment with NumPy and the stock Rerun tools, which the tests use to read what Nudge writes.
+# Installs what a bare Debian lacks. `setup.sh build`: the C compiler that some crates need. `setup.sh graphics`: what
+# the window needs to build, and to draw without a display. `setup.sh python DIR`: a virtual environment with NumPy and the stock Rerun tools, which the tests use to read what Nudge writes.
 set -euo pipefail
 
 fail() { echo "setup: $*" >&2; exit 2; }
@@ -18,6 +18,14 @@ case "${1:-build}" in
 build)
     command -v cargo >/dev/null || fail "no cargo found; install Rust from https://rustup.rs"
     command -v cc >/dev/null || apt_install build-essential
+    ;;
+graphics)
+    # The window: libudev for Rerun's viewer; Xvfb and Mesa's software Vulkan to draw without a display or a GPU.
+    missing=()
+    for package in libudev-dev pkg-config mesa-vulkan-drivers libvulkan1 xvfb xauth; do
+        dpkg -s "$package" >/dev/null 2>&1 || missing+=("$package")
+    done
+    [ "${#missing[@]}" = 0 ] || apt_install "${missing[@]}"
     ;;
 python)
     venv=${2:?setup.sh python DIR}

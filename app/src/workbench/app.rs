@@ -113,8 +113,8 @@ pub struct App {
     dialog: Option<Dialog>,
     /// Whether a person has said that unsaved work may go.
     may_quit: bool,
-    /// Milliseconds that the window's own part of the last frames took.
-    frame_ms: Vec<f32>,
+    /// Milliseconds that the window's own part of the last frame took.
+    frame_ms: Option<f32>,
     /// Milliseconds that the viewer took of the last frame.
     viewer_ms: f32,
     picture_to: Option<PathBuf>,
@@ -183,7 +183,7 @@ impl App {
             errands: 0,
             dialog: None,
             may_quit: false,
-            frame_ms: Vec::new(),
+            frame_ms: None,
             viewer_ms: 0.0,
             picture_to: None,
             script_frames: 0,
@@ -225,11 +225,9 @@ impl App {
         self.carry_out(command);
     }
 
-    /// Milliseconds of the window's own part of a frame: median and largest of the last frames.
-    pub fn frame_ms(&self) -> Option<[f32; 2]> {
-        let mut sorted = self.frame_ms.clone();
-        sorted.sort_by(f32::total_cmp);
-        Some([*sorted.get(sorted.len() / 2)?, *sorted.last()?])
+    /// Milliseconds that the window's own part of the last frame took, the viewer's left out.
+    pub fn last_frame_ms(&self) -> Option<f32> {
+        self.frame_ms
     }
 
     /// Why the program should not end without asking: what would be lost.
@@ -261,7 +259,7 @@ impl eframe::App for App {
     fn logic(&mut self, ctx: &egui::Context, frame: &mut eframe::Frame) {
         let started = std::time::Instant::now();
         self.take_in(ctx);
-        self.frame_ms.push(started.elapsed().as_secs_f32() * 1e3);
+        self.frame_ms = Some(started.elapsed().as_secs_f32() * 1e3);
         if let Some(viewer) = &mut self.viewer {
             viewer.logic(ctx, frame);
         }

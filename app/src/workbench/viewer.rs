@@ -3,6 +3,8 @@
 //! It is fed in memory by a [`rerun::RecordingStream`] and opens no port. Its own panels are hidden; what a person
 //! clicks on comes back through [`Viewer::clicked`].
 
+mod linked;
+
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
 use rerun::external::{eframe, egui, re_log_channel, re_log_types, re_viewer, tokio};
 use rerun::{RecordingStream, RecordingStreamBuilder};
@@ -67,6 +69,10 @@ impl Viewer {
             re_viewer::AsyncRuntimeHandle::new_native(runtime.handle().clone()),
         );
         app.app_options_mut().custom_window_decorations = false;
+        app.extend_view_class(linked::class(), |registrator| {
+            registrator.register_context_system::<linked::LinkedEyes>()
+        })
+        .map_err(|error| error.to_string())?;
         let (sender, receiver) = re_log_channel::log_channel(re_log_channel::LogSource::Sdk);
         app.add_log_receiver(receiver);
         let stream = stream_into(sender).map_err(|error| error.to_string())?;

@@ -9,9 +9,6 @@ use crate::workbench::panels;
 use rerun::external::{eframe, egui};
 use std::time::Instant;
 
-/// Frames whose time is kept.
-const FRAMES: usize = 240;
-
 impl App {
     /// Draws the window; without a frame of eframe's the viewer is left out.
     pub fn draw(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
@@ -44,11 +41,8 @@ impl App {
             self.carry_out(command);
         }
         let viewer_ms = std::mem::take(&mut self.viewer_ms);
-        if let Some(last) = self.frame_ms.last_mut() {
-            *last += started.elapsed().as_secs_f32() * 1e3 - viewer_ms;
-        }
-        if self.frame_ms.len() > FRAMES {
-            self.frame_ms.remove(0);
+        if let Some(taken) = &mut self.frame_ms {
+            *taken += started.elapsed().as_secs_f32() * 1e3 - viewer_ms;
         }
     }
 

@@ -5,4 +5,6 @@
 
 pub mod author;
 pub mod notes;
+#[cfg(test)]
+mod photo;
 pub mod scenes;

@@ -271,7 +271,9 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool
                 let reason = Some("nothing in its directory shall change".to_owned());
                 return Ok((Track::Reading, opened(&path, &episode, moments, reason)?));
             }
-            match Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, cancelled, of, &mut moments)) {
+            let resumed =
+                Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, cancelled, of, &mut moments));
+            match resumed {
                 Ok(driver) => {
                     let opened = opened(&path, driver.episode(), moments, None)?;
                     Ok((Track::Writing(Box::new(driver)), opened))

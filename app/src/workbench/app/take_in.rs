@@ -182,7 +182,7 @@ impl App {
 
     fn dropped(&mut self, ctx: &egui::Context) {
         let files = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
-        for path in files.into_iter().filter_map(|file| file.path) {
+        for path in files.into_iter().filter_map(|file| file.path().map(std::path::Path::to_path_buf)) {
             self.carry_out(Command::Open(path));
         }
     }
@@ -221,11 +221,11 @@ impl App {
             let Some(session) = self.model.session_of(id) else { continue };
             let moment = session.moment(self.model.cursor).clone();
             let key = (id, moment.step);
+            let catalog = session.setup.catalog.clone();
             if self.model.derived.contains_key(&key) || !self.model.deriving.insert(key) {
                 continue;
             }
-            let (catalog, answers, wake) =
-                (session.setup.catalog.clone(), self.answers.0.clone(), self.wake.clone());
+            let (answers, wake) = (self.answers.0.clone(), self.wake.clone());
             self.jobs.add(kind, move || {
                 let _ = answers.send(Answer::Maps(Derived::of(id, &moment, &catalog)));
                 wake();

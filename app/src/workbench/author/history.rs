@@ -19,11 +19,18 @@ pub enum Edit {
 const MOST: usize = 200;
 
 /// What was and what will have been.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct History<T> {
     past: Vec<T>,
     future: Vec<T>,
     open: Option<Edit>,
+}
+
+impl<T> Default for History<T> {
+    /// Nothing was done yet.
+    fn default() -> Self {
+        Self { past: Vec::new(), future: Vec::new(), open: None }
+    }
 }
 
 impl<T: PartialEq> History<T> {

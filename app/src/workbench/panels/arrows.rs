@@ -42,7 +42,7 @@ pub enum Look {
 /// Draws the way of a tool's tip.
 pub fn arrow(painter: &Painter, [from, to]: [Pos2; 2], look: Look, picked: bool) {
     let way = (to - from).normalized();
-    let width = if picked { 3.0 } else { 1.6 };
+    let width: f32 = if picked { 3.0 } else { 1.6 };
     let grey = Color32::from_gray(120);
     match look {
         Look::Rejected => {

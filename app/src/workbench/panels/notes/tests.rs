@@ -1,6 +1,7 @@
 use super::*;
 use crate::workbench::annotations::object_name;
 use crate::workbench::fixture;
+use crate::workbench::panels::photo;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
@@ -91,21 +92,14 @@ fn the_prior_has_a_note_and_no_verdicts() {
     assert!(has(&harness, "Note on the prior") && has(&harness, "Objects are judged after the first step"));
 }
 
-/// A picture for a person to look at: `NUDGE_KEEP` names the folder. Needs a software renderer.
 #[test]
+#[ignore = "writes pictures; needs a wgpu adapter"]
 fn pictures() {
-    let Some(folder) = std::env::var_os("NUDGE_KEEP") else { return };
-    for (name, theme) in [("dark", egui::Theme::Dark), ("light", egui::Theme::Light)] {
-        let mut model = fixture::model();
-        let session = &mut model.sessions[0];
-        let objects = session.moments[5].outcome.as_ref().expect("a step").record.objects.clone();
-        session.annotations.notes.insert(0, "Nothing is known yet.".to_owned());
-        session.annotations.notes.insert(5, "The push uncovered the tin; the box is still a guess.".to_owned());
-        session.annotations.verdicts.entry(5).or_default().insert(object_name(&objects[0]), Verdict::Found);
-        let builder = Harness::builder().with_size([340.0, 640.0]).with_theme(theme).wgpu();
-        let mut harness = builder.build_ui_state(draw, Stage { model, asked: Vec::new() });
-        harness.run_steps(3);
-        let picture = harness.render().expect("rendered");
-        picture.save(std::path::Path::new(&folder).join(format!("notes-{name}.png"))).expect("saved");
-    }
+    let mut model = fixture::model();
+    let session = &mut model.sessions[0];
+    let objects = session.moments[5].outcome.as_ref().expect("a step").record.objects.clone();
+    session.annotations.notes.insert(0, "Nothing is known yet.".to_owned());
+    session.annotations.notes.insert(5, "The push uncovered the tin; the box is still a guess.".to_owned());
+    session.annotations.verdicts.entry(5).or_default().insert(object_name(&objects[0]), Verdict::Found);
+    photo::take("notes", [330.0, 620.0], Stage { model, asked: Vec::new() }, draw, |_| true);
 }

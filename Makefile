@@ -6,11 +6,12 @@ VENV  := $(CARGO_TARGET_DIR)/venv
 # The window with Rerun's viewer inside: about 1,000 crates. Without it the build is headless.
 WINDOW := --features nudge-tests/workbench
 
-.PHONY: help setup graphics python demo workbench test bench lint
+.PHONY: help setup graphics python demo workbench test test-window bench bench-window lint
 help:
 	@echo 'make demo        map a crowded shelf: prints the table, writes out/demo/'
 	@echo 'make workbench   build and open the window (the first build takes about 45 minutes on two cores)'
-	@echo 'make test        all tests, those of the window too'
+	@echo 'make test        all tests of the headless build'
+	@echo 'make test-window those of the window too'
 	@echo 'make bench       the speed of the parts that matter, beside their targets'
 	@echo 'make lint        formatting, clippy and documentation without warnings'
 
@@ -31,15 +32,22 @@ workbench: graphics
 	cargo build --release --locked --workspace $(WINDOW)
 	$(NUDGE)
 
-test: graphics python
+test: setup python
+	cargo build --release --locked --workspace
+	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace
+
+test-window: graphics python
 	cargo build --release --locked --workspace $(WINDOW)
 	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace $(WINDOW)
 
-bench: graphics
-	cargo build --release --locked --workspace $(WINDOW)
-	cargo bench --locked --workspace $(WINDOW) --bench '*'
+bench: setup
+	cargo build --release --locked --workspace
+	cargo bench --locked --workspace --bench gain --bench speed
 
-lint: graphics
+bench-window: graphics
+	cargo bench --locked --workspace $(WINDOW) --bench window
+
+lint: setup
 	cargo fmt --all --check
-	cargo clippy --release --locked --workspace --all-targets $(WINDOW) -- -D warnings
-	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps $(WINDOW)
+	cargo clippy --release --locked --workspace --all-targets -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps

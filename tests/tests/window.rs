@@ -14,7 +14,8 @@ fn episode(policy: &str) -> PathBuf {
     let out = std::env::temp_dir().join(out.file_name().expect("name"));
     let out = out.with_file_name(format!("nudge-window-test-{}-{policy}", std::process::id()));
     if !out.join("summary.png").exists() {
-        let args = ["run", SCENE, "--belief", "classical", "--budget", "10", "--seed", "1", "--policy", policy, "--out"];
+        let args =
+            ["run", SCENE, "--belief", "classical", "--budget", "10", "--seed", "1", "--policy", policy, "--out"];
         nudge_ok(&[&args[..], &[out.to_str().expect("utf-8")]].concat());
     }
     out

@@ -307,9 +307,30 @@ fn two_thousand_random_events_never_panic() {
     };
     // Keys that open the system's dialogs or end the program are left out.
     let keys = [
-        Key::A, Key::D, Key::R, Key::Enter, Key::Escape, Key::Tab, Key::Space, Key::Comma, Key::Period, Key::Home,
-        Key::End, Key::Delete, Key::ArrowLeft, Key::ArrowUp, Key::F1, Key::Num1, Key::Num2, Key::Num3, Key::Num4,
-        Key::Num5, Key::Num6, Key::Z, Key::B, Key::L,
+        Key::A,
+        Key::D,
+        Key::R,
+        Key::Enter,
+        Key::Escape,
+        Key::Tab,
+        Key::Space,
+        Key::Comma,
+        Key::Period,
+        Key::Home,
+        Key::End,
+        Key::Delete,
+        Key::ArrowLeft,
+        Key::ArrowUp,
+        Key::F1,
+        Key::Num1,
+        Key::Num2,
+        Key::Num3,
+        Key::Num4,
+        Key::Num5,
+        Key::Num6,
+        Key::Z,
+        Key::B,
+        Key::L,
     ];
     for _ in 0..2_000 {
         let at = pos2(random(1440) as f32, random(900) as f32);

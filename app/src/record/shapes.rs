@@ -105,6 +105,7 @@ pub fn view_frusta(array: &ViewArray) -> rerun::LineStrips3D {
 }
 
 /// One view as a frustum of the given depth, metres.
+#[cfg(feature = "workbench")]
 pub(crate) fn frustum(view: &View, intrinsics: &Intrinsics, depth_m: f32) -> rerun::LineStrips3D {
     rerun::LineStrips3D::new([frustum_line(view, intrinsics, depth_m)])
 }

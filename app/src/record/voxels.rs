@@ -183,6 +183,6 @@ mod tests {
     #[test]
     fn a_voxel_at_the_grids_face_shows() {
         let grid = Grid::for_shelf([0.02, 0.02, 0.02], 0.01);
-        assert_eq!(surface(&grid, &vec![true; 8]).len(), 8);
+        assert_eq!(surface(&grid, &[true; 8]).len(), 8);
     }
 }

@@ -15,6 +15,8 @@ pub mod episode;
 pub mod gains;
 pub mod maps;
 pub mod notes;
+#[cfg(test)]
+mod photo;
 pub mod push;
 pub mod scenes;
 pub mod why;

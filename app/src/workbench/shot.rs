@@ -40,13 +40,8 @@ const CALM_FRAMES: usize = 25;
 /// # Errors
 /// When the file cannot be opened, or there is no graphics driver, not even a software one.
 pub fn shoot(shot: &Shot, out: PathBuf) -> Result<RgbImage> {
-    let options = Options {
-        out,
-        light: Some(shot.light),
-        layout: Some(shot.layout),
-        look_only: true,
-        ..Options::default()
-    };
+    let options =
+        Options { out, light: Some(shot.light), layout: Some(shot.layout), look_only: true, ..Options::default() };
     let [width, height] = shot.size.map(|n| n as f32);
     let setup = re_viewer::native::eframe_options(None).wgpu_options.wgpu_setup;
     let mut harness = Harness::<App>::builder()
@@ -126,7 +121,8 @@ fn explain(app: &mut App, layout: LayoutKind) {
     match layout {
         LayoutKind::Why => {
             let entropy = app.model.derived().map(|derived| crate::picture::cell_entropy(&derived.belief));
-            let most = entropy.and_then(|entropy| (0..entropy.len()).max_by(|&a, &b| entropy[a].total_cmp(&entropy[b])));
+            let most =
+                entropy.and_then(|entropy| (0..entropy.len()).max_by(|&a, &b| entropy[a].total_cmp(&entropy[b])));
             app.ask(Command::Pick(most.map(Picked::Cell)));
         }
         LayoutKind::Gains => {

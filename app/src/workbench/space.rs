@@ -261,10 +261,11 @@ impl Painter {
                 self.log(at::VIEWS, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
             } else {
                 let range = side.decision.as_ref().map_or([0.0, 1.0], |decision| shapes::gain_range(decision));
-                let colors = views.views.iter().enumerate().map(|(at, _)| match gains.and_then(|gains| gains.get(at)) {
-                    Some(gain) => rerun::Color::from(Colormap::Cividis.of(*gain, range)),
-                    None => rerun::Color::from(shapes::REJECTED_RGB),
-                });
+                let colors =
+                    views.views.iter().enumerate().map(|(at, _)| match gains.and_then(|gains| gains.get(at)) {
+                        Some(gain) => rerun::Color::from(Colormap::Cividis.of(*gain, range)),
+                        None => rerun::Color::from(shapes::REJECTED_RGB),
+                    });
                 self.log(at::VIEWS, &shapes::view_frusta(views).with_colors(colors));
             }
         }
@@ -413,8 +414,9 @@ impl Painter {
                 Some(Picked::Voxel(index)) => box_edges(grid, index..index + 1),
                 Some(Picked::Cell(cell)) => box_edges(grid, grid.column(cell)),
             };
-            let strips =
-                strips.with_colors([rerun::Color::from([255, 60, 160])]).with_radii([rerun::Radius::new_ui_points(2.0)]);
+            let strips = strips
+                .with_colors([rerun::Color::from([255, 60, 160])])
+                .with_radii([rerun::Radius::new_ui_points(2.0)]);
             self.log(at::PICKED, &strips);
         }
     }
@@ -440,11 +442,7 @@ struct Voxels<'a> {
 
 impl<'a> Voxels<'a> {
     /// The voxels to draw and their colours. Without a state before, nothing has changed.
-    fn drawn(
-        &self,
-        display: &Display,
-        before: Option<&'a Belief>,
-    ) -> (Vec<usize>, Box<dyn Fn(usize) -> Rgb + 'a>) {
+    fn drawn(&self, display: &Display, before: Option<&'a Belief>) -> (Vec<usize>, Box<dyn Fn(usize) -> Rgb + 'a>) {
         let (belief, truth, catalog) = (self.belief, self.truth, self.catalog);
         let grid = &belief.grid;
         let height = grid.dims[2];
@@ -479,13 +477,13 @@ impl<'a> Voxels<'a> {
                 None | Some(BACKGROUND) => colors::UNKNOWN_RGB,
                 Some(class) => colors::of_class(catalog, class),
             }),
-            ColourBy::Error => Box::new(move |index| {
-                match (belief.probability(index) > 0.5, truth.occupancy[index] == 1) {
+            ColourBy::Error => {
+                Box::new(move |index| match (belief.probability(index) > 0.5, truth.occupancy[index] == 1) {
                     (true, false) => colors::HALLUCINATED_RGB,
                     (false, true) => colors::MISSED_RGB,
                     _ => [226, 228, 232],
-                }
-            }),
+                })
+            }
             ColourBy::Change => Box::new(move |index| {
                 let change = before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
                 Colormap::Diverging.of(change, [-1.0, 1.0])
@@ -546,8 +544,13 @@ fn box_edges(grid: &Grid, voxels: std::ops::Range<usize>) -> rerun::LineStrips3D
     let half = 0.5 * grid.voxel_m;
     let low = grid.center(grid.voxel(voxels.start)).coords.add_scalar(-half);
     let high = grid.center(grid.voxel(voxels.end - 1)).coords.add_scalar(half);
-    let ring = |z: f32| vec![[low.x, low.y, z], [high.x, low.y, z], [high.x, high.y, z], [low.x, high.y, z], [low.x, low.y, z]];
+    let ring = |z: f32| {
+        vec![[low.x, low.y, z], [high.x, low.y, z], [high.x, high.y, z], [low.x, high.y, z], [low.x, low.y, z]]
+    };
     let mut strips = vec![ring(low.z), ring(high.z)];
-    strips.extend([[low.x, low.y], [high.x, low.y], [high.x, high.y], [low.x, high.y]].map(|[x, y]| vec![[x, y, low.z], [x, y, high.z]]));
+    strips.extend(
+        [[low.x, low.y], [high.x, low.y], [high.x, high.y], [low.x, high.y]]
+            .map(|[x, y]| vec![[x, y, low.z], [x, y, high.z]]),
+    );
     rerun::LineStrips3D::new(strips)
 }

@@ -17,14 +17,18 @@ pub fn of(layout: LayoutKind) -> Option<(LayoutKind, Layout)> {
             "Belief",
             &[&[at::BELIEF, at::OBJECTS, at::VIEWS, at::CURRENT, at::CANDIDATES, at::CHOSEN], &pointer[..]].concat(),
         ),
-        LayoutKind::Gains => {
-            view("Where the gain comes from", &[&[at::GAIN, at::OBJECTS, at::VIEWS, at::CURRENT], &pointer[..]].concat())
-        }
+        LayoutKind::Gains => view(
+            "Where the gain comes from",
+            &[&[at::GAIN, at::OBJECTS, at::VIEWS, at::CURRENT], &pointer[..]].concat(),
+        ),
         LayoutKind::Push => Part::Column(vec![
             (
                 1.0,
                 Part::Row(vec![
-                    (1.0, view("Now", &[&[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN], &pointer[..]].concat())),
+                    (
+                        1.0,
+                        view("Now", &[&[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN], &pointer[..]].concat()),
+                    ),
                     (1.0, view("Predicted", &[at::PREDICTED, at::SWEPT, at::CHOSEN])),
                 ]),
             ),

@@ -100,7 +100,13 @@ pub struct Worker {
 
 impl Worker {
     /// Starts the thread. Events carry the id, so that all workers can share a channel.
-    pub fn spawn(id: SessionId, begin: Begin, catalog: Arc<Catalog>, events: Sender<(SessionId, Event)>, wake: Wake) -> Self {
+    pub fn spawn(
+        id: SessionId,
+        begin: Begin,
+        catalog: Arc<Catalog>,
+        events: Sender<(SessionId, Event)>,
+        wake: Wake,
+    ) -> Self {
         let (orders, inbox) = channel();
         let cancelled = Arc::new(AtomicBool::new(false));
         let post = Post { id, events, wake };

@@ -252,8 +252,8 @@ mod tests {
             assert_eq!(class.name, name);
             assert_eq!(catalog.by_name(name).map(|c| c.id), Some(class.id));
             let bounds = class.solid.bounds();
-            for axis in 0..3 {
-                assert!((bounds.size()[axis] - size[axis]).abs() < 1e-6, "{name} {:?}", bounds.size());
+            for (measured, published) in bounds.size().iter().zip(size) {
+                assert!((measured - published).abs() < 1e-6, "{name} {:?}", bounds.size());
             }
             assert!(bounds.min.z.abs() < 1e-7 && (bounds.min.x + bounds.max.x).abs() < 1e-6, "{name} stands centred");
             let doubled: Vec<u8> = class.doubles.iter().map(|id| id.0).collect();

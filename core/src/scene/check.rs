@@ -150,7 +150,7 @@ fn check_object(scene: &Scene, catalog: &Catalog, at: usize, object: &Object, pl
         let [x, y] = object.position;
         return wrong("position", format!("position [{x}, {y}]: must be two finite numbers of metres in the shelf"));
     }
-    if !(object.yaw_deg.abs() <= 3600.0) {
+    if !object.yaw_deg.is_finite() || object.yaw_deg.abs() > 3600.0 {
         return wrong("yaw_deg", format!("yaw_deg = {}: must be a finite number of degrees", object.yaw_deg));
     }
     let [low, high] = SCALE;

@@ -3,11 +3,11 @@
 use super::{Answer, App, ChosenFor, Opening};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::{Dialog, Reply};
+use crate::workbench::export;
 use crate::workbench::jobs::JobKind;
 use crate::workbench::model::{GainSource, LayoutKind, Preview};
 use crate::workbench::session::{Activity, SessionId};
 use crate::workbench::worker::{Begin, Order, Worker};
-use crate::workbench::export;
 use nudge_core::belief::SweptPush;
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
@@ -451,9 +451,10 @@ impl App {
 
     /// Where something would go unless a person says otherwise.
     fn proposal(&self, what: MenuCommand) -> PathBuf {
-        let name = self.model.session().map_or_else(|| "window".to_owned(), |session| {
-            session.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
-        });
+        let name = self.model.session().map_or_else(
+            || "window".to_owned(),
+            |session| session.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        );
         let exports = self.options.out.join("exports");
         match what {
             MenuCommand::ExportEpisode => exports.join(&name),

@@ -149,9 +149,12 @@ impl App {
             },
         );
         if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
-            egui::Panel::bottom("curves").resizable(true).default_size(170.0).size_range(110.0..=420.0).show(ui, |ui| {
-                panels::curves::show(ui, &mut self.model, ask);
-            });
+            egui::Panel::bottom("curves").resizable(true).default_size(170.0).size_range(110.0..=420.0).show(
+                ui,
+                |ui| {
+                    panels::curves::show(ui, &mut self.model, ask);
+                },
+            );
         }
         if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {
             egui::Panel::right("maps").default_size(390.0).size_range(220.0..=800.0).show(ui, |ui| {

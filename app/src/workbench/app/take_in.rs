@@ -1,6 +1,7 @@
 //! What comes in every frame: events of workers, answers of jobs, clicks in the viewer, keys, dropped files.
 
 use super::{Answer, App, ChosenFor};
+use crate::workbench::annotations::Annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::derive::Derived;
 use crate::workbench::jobs::JobKind;
@@ -9,7 +10,6 @@ use crate::workbench::session::{Activity, Session, SessionId};
 use crate::workbench::space::{Side, Space};
 use crate::workbench::viewer::Clicked;
 use crate::workbench::worker::{Event, Opened};
-use crate::workbench::annotations::Annotations;
 use rerun::external::egui;
 use std::sync::{Arc, PoisonError};
 
@@ -164,10 +164,8 @@ impl App {
             let Some(keys) = entry.shortcut() else { continue };
             let plain = keys.modifiers.is_none();
             // Undo and the keys without a modifier belong to whatever is typed in, and the editor has its own.
-            let edits = matches!(
-                entry,
-                MenuCommand::Undo | MenuCommand::Redo | MenuCommand::Duplicate | MenuCommand::Delete
-            );
+            let edits =
+                matches!(entry, MenuCommand::Undo | MenuCommand::Redo | MenuCommand::Duplicate | MenuCommand::Delete);
             if (plain && (typing || self.dialog.is_some())) || (edits && (typing || authoring)) {
                 continue;
             }
@@ -182,7 +180,7 @@ impl App {
 
     fn dropped(&mut self, ctx: &egui::Context) {
         let files = ctx.input_mut(|input| std::mem::take(&mut input.raw.dropped_files));
-        for path in files.into_iter().filter_map(|file| file.path().map(std::path::Path::to_path_buf)) {
+        for path in files.iter().map(|file| file.path().to_path_buf()) {
             self.carry_out(Command::Open(path));
         }
     }
@@ -199,9 +197,9 @@ impl App {
         self.errand(move |answers| {
             let rgb = image.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect();
             let picture = image::RgbImage::from_raw(image.width() as u32, image.height() as u32, rgb);
-            let written = picture.ok_or_else(|| "the picture is empty".to_owned()).and_then(|picture| {
-                crate::picture::save(&picture, &path).map_err(|error| error.to_string())
-            });
+            let written = picture
+                .ok_or_else(|| "the picture is empty".to_owned())
+                .and_then(|picture| crate::picture::save(&picture, &path).map_err(|error| error.to_string()));
             let _ = answers.send(match written {
                 Ok(()) => Answer::Tell(Level::Info, format!("Wrote {}", path.display())),
                 Err(words) => Answer::Tell(Level::Error, words),

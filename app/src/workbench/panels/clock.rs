@@ -8,8 +8,12 @@ use rerun::external::egui;
 /// Draws the clock.
 pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     ui.horizontal(|ui| {
-        let buttons =
-            [(MenuCommand::First, "⏮"), (MenuCommand::StepBack, "⏴"), (MenuCommand::StepForward, "⏵"), (MenuCommand::Last, "⏭")];
+        let buttons = [
+            (MenuCommand::First, "⏮"),
+            (MenuCommand::StepBack, "⏴"),
+            (MenuCommand::StepForward, "⏵"),
+            (MenuCommand::Last, "⏭"),
+        ];
         for (entry, icon) in buttons {
             let button = ui.add_enabled(entry.is_available(model), egui::Button::new(icon));
             button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, entry.title()));
@@ -30,7 +34,8 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
                 Some(reason) => ("○", format!("Can only be looked at: {reason}")),
             };
             ui.weak(&path).on_hover_text(&words);
-            let color = if session.read_only.is_none() { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
+            let color =
+                if session.read_only.is_none() { ui.visuals().error_fg_color } else { ui.visuals().text_color() };
             ui.colored_label(color, dot).on_hover_text(&words);
             ui.separator();
             if ui.button(branch.title()).on_hover_text(branch.tooltip()).clicked() {
@@ -63,7 +68,10 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
                         }
                     }
                     for step in session.moments.len()..=session.record.config.budget {
-                        ui.add_enabled(false, egui::Label::new(egui::RichText::new(step.to_string()).monospace().weak()));
+                        ui.add_enabled(
+                            false,
+                            egui::Label::new(egui::RichText::new(step.to_string()).monospace().weak()),
+                        );
                     }
                 });
             });

@@ -9,7 +9,7 @@ use crate::workbench::session::Session;
 use egui_plot::{AxisHints, GridMark, Line, LineStyle, MarkerShape, Plot, PlotPoint, Points, VLine};
 use nudge_core::plan::Action;
 use rerun::external::egui::{
-    self, Color32, CursorIcon, Rangef, RichText, Sense, Stroke, TextStyle, Ui, WidgetInfo, WidgetType, vec2,
+    Color32, CursorIcon, Rangef, RichText, Sense, Stroke, TextStyle, Ui, WidgetInfo, WidgetType, vec2,
 };
 
 /// The scores between 0 and 1 that are drawn.

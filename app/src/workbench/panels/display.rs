@@ -85,11 +85,7 @@ fn range(
     what: &str,
 ) {
     for (value, end) in [(low, "Least"), (high, "Most")] {
-        let drag = egui::DragValue::new(value)
-            .range(within.clone())
-            .speed(speed)
-            .fixed_decimals(2)
-            .suffix(suffix);
+        let drag = egui::DragValue::new(value).range(within.clone()).speed(speed).fixed_decimals(2).suffix(suffix);
         let name = format!("{end} {what}");
         let response = ui.add(drag);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::DragValue, true, &name));

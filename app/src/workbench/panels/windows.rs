@@ -134,9 +134,7 @@ pub fn toasts(ctx: &egui::Context, toasts: &mut Toasts, _ask: &mut Vec<Command>)
                     ui.colored_label(color, mark);
                     ui.label(&toast.text);
                     let close = ui.small_button("×");
-                    close.widget_info(|| {
-                        egui::WidgetInfo::labeled(egui::WidgetType::Button, true, "Close message")
-                    });
+                    close.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, "Close message"));
                     if close.clicked() {
                         closed = Some(toast.text.clone());
                     }

@@ -65,7 +65,7 @@ impl FloorGrid {
         let mut free_row = vec![0; self.words];
         let mut free = (0..self.columns).filter(|x| (left..=right).contains(&self.x(*x)));
         if let Some(first) = free.next() {
-            set_range(&mut free_row, first, free.last().unwrap_or(first));
+            set_range(&mut free_row, first, free.next_back().unwrap_or(first));
         }
         let mut mask = FloorMask(vec![u64::MAX; self.words * self.rows]);
         for row in (0..self.rows).filter(|row| (front..=back).contains(&self.y(*row))) {

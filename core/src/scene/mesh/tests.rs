@@ -10,7 +10,10 @@ fn box_mesh(min: [f32; 3], max: [f32; 3]) -> (Vec<[f32; 3]>, Vec<[u32; 4]>) {
     ((0..8).map(corner).collect(), quads.to_vec())
 }
 
-fn obj(meshes: &[(Vec<[f32; 3]>, Vec<[u32; 4]>)]) -> String {
+/// Points and faces of four corners.
+type Quads = (Vec<[f32; 3]>, Vec<[u32; 4]>);
+
+fn obj(meshes: &[Quads]) -> String {
     let mut text = String::new();
     let mut first = 1;
     for (at, (points, quads)) in meshes.iter().enumerate() {

@@ -59,7 +59,7 @@ pub fn components(groups: &[Group]) -> Result<Topology, String> {
     }
     // The largest surface is an outside, whichever way it is wound.
     let largest = surfaces.iter().map(Component::volume).max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0);
-    let outer: Vec<_> = surfaces.iter().filter_map(|s| (s.volume() * largest > 0.0).then(|| bounds(s))).collect();
+    let outer: Vec<_> = surfaces.iter().filter(|s| s.volume() * largest > 0.0).map(bounds).collect();
     for mut surface in surfaces {
         if surface.volume() * largest < 0.0 {
             let inside = |outer: &crate::solid::Bounds| {

@@ -9,9 +9,9 @@
 //!
 //! * [`GainField`] holds one byte per voxel, padded with an opaque border, so that walking a ray is a chain of table
 //!   look-ups without a bounds test.
-//! * A ray advances slab by slab along its steepest axis, in fixed point ([`ray`]): where it is after `n` slabs is one
+//! * A ray advances slab by slab along its steepest axis, in fixed point (`ray`): where it is after `n` slabs is one
 //!   multiplication, so it can jump without the voxels that it visits depending on the jumps.
-//! * The byte of a transparent voxel tells how much transparent space lies ahead ([`skip`]); a ray jumps through it.
+//! * The byte of a transparent voxel tells how much transparent space lies ahead (`skip`); a ray jumps through it.
 //!   Four neighbouring rays jump side by side, so that their table look-ups overlap.
 //! * A ray ends at an opaque voxel or when less than [`NEGLIGIBLE`] of it is left.
 //!

@@ -1,0 +1,93 @@
+//! What carries pushes out: the arm, or a tool that flies.
+
+use super::{Arm, Joints, Motion, RobotPlacement, Space};
+use crate::grid::{Grid, VoxelSet};
+use crate::scene::Shelf;
+use crate::tool::Tool;
+use serde::{Deserialize, Serialize};
+
+/// Speed of the tip on the way to a push, metres per second.
+pub const WAY_IN_M_S: f64 = 0.25;
+/// Speed of the tip while it pushes, metres per second.
+pub const PUSH_M_S: f64 = 0.10;
+/// Speed of the tip on the way back, metres per second.
+pub const WAY_BACK_M_S: f64 = 0.50;
+
+/// What carries pushes out.
+#[derive(Clone, Debug)]
+pub enum Pusher {
+    /// A gripper with two links that comes in straight and needs no arm.
+    Free(Tool),
+    /// An arm before the shelf.
+    Arm(Box<ArmTool>),
+}
+
+impl Default for Pusher {
+    fn default() -> Self {
+        Self::Free(Tool::standard())
+    }
+}
+
+/// An arm with the shelf that it pushes in and the place where it waits.
+#[derive(Clone, Debug)]
+pub struct ArmTool {
+    /// The arm.
+    pub arm: Arm,
+    /// The shelf.
+    pub shelf: Shelf,
+    /// Where the arm waits between pushes; `None` when it reaches no place before the shelf, and then nothing in it.
+    pub ready: Option<Joints>,
+}
+
+impl ArmTool {
+    /// An arm before a shelf.
+    pub fn new(arm: Arm, shelf: Shelf) -> Self {
+        let ready = Space::empty(&arm, &shelf).ready();
+        Self { arm, shelf, ready }
+    }
+
+    /// The shipped arm where it stands by default.
+    pub fn standard(shelf: Shelf) -> Self {
+        Self::new(Arm::standard(&RobotPlacement::default()), shelf)
+    }
+
+    /// The arm among voxels that are believed to be there.
+    pub fn space(&self) -> Space<'_> {
+        Space::empty(&self.arm, &self.shelf)
+    }
+}
+
+/// The arm's motion for one push.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PushMotion {
+    /// From where the arm waits to the push's start.
+    pub way_in: Motion,
+    /// Along the push.
+    pub push: Motion,
+}
+
+impl PushMotion {
+    /// The motion through these configurations at the speeds of a push.
+    pub fn new(arm: &Arm, way_in: &[Joints], push: &[Joints]) -> Self {
+        Self { way_in: Motion::along(arm, way_in, WAY_IN_M_S), push: Motion::along(arm, push, PUSH_M_S) }
+    }
+
+    /// The way back from the push's end, the same way, faster.
+    pub fn way_back(&self, arm: &Arm) -> Motion {
+        let path: Vec<Joints> = self.push.path().rev().chain(self.way_in.path().rev().skip(1)).collect();
+        Motion::along(arm, &path, WAY_BACK_M_S)
+    }
+
+    /// How long it takes, way back included, seconds.
+    pub fn duration_s(&self, arm: &Arm) -> f64 {
+        self.way_in.duration_s() + self.push.duration_s() + self.way_back(arm).duration_s()
+    }
+
+    /// Every voxel that the arm touches on the way in or along the push.
+    pub fn swept_volume(&self, arm: &Arm, grid: &Grid) -> VoxelSet {
+        let mut swept = VoxelSet::empty(grid);
+        let path: Vec<Joints> = self.way_in.path().chain(self.push.path().skip(1)).collect();
+        arm.sweep(&path, grid, &mut swept);
+        swept
+    }
+}

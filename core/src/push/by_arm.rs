@@ -1,0 +1,158 @@
+//! Whether the arm can carry a push out: it reaches the start, follows the line, and there is a free way there.
+//!
+//! The gripper is level and points into the shelf, straight or turned a little ([`YAWS_DEG`]). For each turn and each
+//! branch of the inverse: the start pose must be free, the line is followed without leaving the branch, then the arm
+//! backs straight out of the shelf; where that is not free all the way, the planner looks for a way from where the arm
+//! waits to where backing out ended. Contact is allowed only between the gripper and the object that is pushed.
+
+use super::{Rejection, Stage};
+use crate::arm::{
+    Arm, ArmTool, DistanceField, Follow, Hit, Joints, PlanSettings, PushMotion, Space, follow_line, level_tool, plan,
+};
+use crate::belief::{Belief, Patch, beta_mean};
+use crate::grid::VoxelSet;
+use crate::rng::ChaCha8Rng;
+use crate::tool::{CLEARANCE_M, Push};
+use nalgebra::Vector3;
+
+/// Occupancy probability above which the arm keeps away from a voxel.
+pub const AVOIDED: f32 = 0.7;
+/// Turns of the gripper that are tried, degrees counter-clockwise from straight into the shelf.
+pub const YAWS_DEG: [f64; 5] = [0.0, 20.0, -20.0, 40.0, -40.0];
+/// Ways from the waiting place that the planner is asked for, per push, before there is none.
+const QUERIES: usize = 2;
+/// Work of one query: a push that takes long to plan is one that another push can replace.
+const QUERY: PlanSettings = PlanSettings { rounds: 120, shortcuts: 10 };
+
+/// A belief prepared for checking many pushes by an arm.
+pub struct ArmClearance<'a> {
+    tool: &'a ArmTool,
+    avoided: VoxelSet,
+    field: DistanceField,
+    ready: Option<Joints>,
+}
+
+impl<'a> ArmClearance<'a> {
+    /// Collects the voxels that the arm keeps away from and the distances to them.
+    pub fn new(tool: &'a ArmTool, belief: &Belief) -> Self {
+        let mut avoided = VoxelSet::empty(&belief.grid);
+        for (index, a) in belief.occupancy.iter().enumerate() {
+            if beta_mean(*a) > AVOIDED {
+                avoided.insert(index);
+            }
+        }
+        let field = DistanceField::new(&belief.grid, &avoided);
+        Self { tool, avoided, field, ready: tool.ready }
+    }
+
+    /// The arm.
+    pub fn arm(&self) -> &Arm {
+        &self.tool.arm
+    }
+
+    /// The arm among what the belief is sure of.
+    pub fn space(&self) -> Space<'_> {
+        self.tool.space().with_map(&self.avoided, &self.field)
+    }
+
+    /// The arm's motion for a push against `target`, or why there is none.
+    ///
+    /// Of the turns and branches that fail, the one that came farthest gives the reason.
+    pub fn motion(&self, push: &Push, target: &Patch, rng: &mut ChaCha8Rng) -> Result<PushMotion, Rejection> {
+        let Some(ready) = self.ready else { return Err(Rejection::Unreachable { stage: Stage::Start }) };
+        let touchable = |cell: usize| target.contains(cell);
+        let space = self.space();
+        let touching = space.touching(&touchable);
+        let travel = push.direction().map(f64::from) * f64::from(push.length_m);
+        let mut reason = Reason { depth: 0, rejection: Rejection::Unreachable { stage: Stage::Start } };
+        let mut goals: Vec<Attempt> = Vec::new();
+        for yaw in YAWS_DEG {
+            let pose = level_tool(&push.start_point().map(f64::from), yaw.to_radians());
+            for start in self.tool.arm.inverse(&pose, &ready) {
+                if let Some(hit) = touching.hit(&start) {
+                    reason.deeper(1, blocked(Stage::Start, hit));
+                    continue;
+                }
+                let (line, hit) = self.follow(&touching, &start, &travel);
+                if !line.complete {
+                    let unreachable = Rejection::Unreachable { stage: Stage::Push };
+                    reason.deeper(2, hit.map_or(unreachable, |hit| blocked(Stage::Push, hit)));
+                    continue;
+                }
+                let out = Vector3::new(0.0, -(push.start[1] + CLEARANCE_M).max(0.0) as f64, 0.0);
+                let (back, hit) = self.follow(&touching, &start, &out);
+                let blocker = hit.map(|hit| blocked(Stage::WayIn, hit));
+                let complete = back.complete;
+                goals.push(Attempt { push: line.path, chain: back.path, blocker });
+                // A way that leads straight out is as good as it gets; the planner need not be asked for others.
+                if complete && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], rng) {
+                    return Ok(motion);
+                }
+                if complete {
+                    goals.pop();
+                    reason.deeper(3, Rejection::NoWay);
+                }
+            }
+        }
+        for attempts in goals.chunks(1).take(QUERIES) {
+            if let Some(motion) = self.finish(&space, &ready, attempts, rng) {
+                return Ok(motion);
+            }
+            reason.deeper(3, attempts[0].blocker.clone().unwrap_or(Rejection::NoWay));
+        }
+        Err(reason.rejection)
+    }
+
+    /// Follows a line as far as it is free; what stopped it, if something did.
+    fn follow(&self, space: &Space<'_>, start: &Joints, travel: &Vector3<f64>) -> (Follow, Option<Hit>) {
+        let mut hit = None;
+        let follow = follow_line(&self.tool.arm, start, travel, |joints| {
+            hit = space.hit(joints);
+            hit.is_none()
+        });
+        (follow, hit)
+    }
+
+    /// A way from where the arm waits to the start of one of the attempts.
+    fn finish(
+        &self,
+        space: &Space<'_>,
+        ready: &Joints,
+        attempts: &[Attempt],
+        rng: &mut ChaCha8Rng,
+    ) -> Option<PushMotion> {
+        let chains: Vec<Vec<Joints>> = attempts.iter().map(|attempt| attempt.chain.clone()).collect();
+        let planned = plan(space, ready, &chains, QUERY, rng)?;
+        let start = planned.path.last()?;
+        let attempt = attempts.iter().find(|attempt| attempt.push.first() == Some(start))?;
+        Some(PushMotion::new(&self.tool.arm, &planned.path, &attempt.push))
+    }
+}
+
+/// A push that lacks its way in.
+struct Attempt {
+    /// Configurations along the push.
+    push: Vec<Joints>,
+    /// Configurations from the push's start straight out of the shelf, as far as they are free.
+    chain: Vec<Joints>,
+    /// What kept it from backing out all the way.
+    blocker: Option<Rejection>,
+}
+
+/// The reason of the attempt that came farthest.
+struct Reason {
+    depth: u8,
+    rejection: Rejection,
+}
+
+impl Reason {
+    fn deeper(&mut self, depth: u8, rejection: Rejection) {
+        if depth > self.depth {
+            *self = Self { depth, rejection };
+        }
+    }
+}
+
+fn blocked(stage: Stage, hit: Hit) -> Rejection {
+    Rejection::ArmBlocked { stage, hit }
+}

@@ -1,0 +1,132 @@
+//! A push by the arm: its links follow the motion as kinematic bodies, and what they meet is taken down.
+
+use super::physics::{BLOCKING_FORCE_N, TIME_STEP_S};
+use super::{PushOutcome, World};
+use crate::arm::{Arm, Joints, Motion, PushMotion};
+use crate::scene::{Body, ObjectId};
+use serde::{Deserialize, Serialize};
+
+/// An object that a link of the arm touched.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LinkContact {
+    /// The link.
+    pub link: String,
+    /// The object.
+    pub object: ObjectId,
+}
+
+/// What became of a motion.
+struct Ride {
+    /// The last configuration.
+    joints: Joints,
+    /// When the arm was blocked, seconds since the motion began.
+    blocked_s: Option<f64>,
+}
+
+impl World {
+    /// Carries out a push by the arm: in, along the push, back the same way; then the bodies settle.
+    ///
+    /// An arm that is blocked stops there, goes back and reports a stall. It is planned clear of the shelf and does not
+    /// feel it; how deep it got into a panel is in the outcome all the same.
+    pub fn execute_motion(&mut self, arm: &Arm, motion: &PushMotion) -> PushOutcome {
+        let before = self.poses();
+        let dropped_before = self.dropped.clone();
+        self.physics.begin();
+        let steps_before = self.physics.steps();
+        let mut notes = Notes::default();
+        let Some(first) = motion.way_in.at(0.0) else { return self.outcome(&before, &dropped_before, steps_before) };
+        self.physics.insert_arm(arm, &first);
+        let start = motion.push.at(0.0).unwrap_or(first);
+
+        let way_in = self.ride(arm, &motion.way_in, &mut notes);
+        let (mut stalled, mut pushed_m) = (way_in.blocked_s.is_some(), 0.0);
+        let mut last = way_in.joints;
+        let mut back: Vec<Joints> = before_time(&motion.way_in, way_in.blocked_s);
+        if !stalled {
+            let along = self.ride(arm, &motion.push, &mut notes);
+            stalled = along.blocked_s.is_some();
+            last = along.joints;
+            let tip = |joints: &Joints| arm.world_from_tool(joints).translation.vector;
+            pushed_m = (tip(&last) - tip(&start)).norm() as f32;
+            back.extend(before_time(&motion.push, along.blocked_s));
+        }
+        back.push(last);
+        back.reverse();
+        let way_back = Motion::along(arm, &back, crate::arm::WAY_BACK_M_S);
+        // An arm that cannot even go back is taken away where it is: a real one would give way.
+        self.ride(arm, &way_back, &mut notes);
+        self.physics.remove_arm();
+        self.come_to_rest();
+        self.read_back();
+
+        let mut outcome = self.outcome(&before, &dropped_before, steps_before);
+        outcome.stalled = stalled;
+        outcome.pushed_m = pushed_m;
+        outcome.link_contacts = notes.contacts;
+        outcome.against_wall = notes.against_wall;
+        outcome.arm_in_shelf_m = notes.arm_in_shelf_m;
+        outcome
+    }
+
+    /// What happened since `before`, for an arm that has not pushed yet.
+    fn outcome(&self, before: &[crate::Pose], dropped_before: &[bool], steps_before: u64) -> PushOutcome {
+        let ids = self.bodies.iter().zip(self.dropped.iter().zip(dropped_before));
+        PushOutcome {
+            displacement_m: self.displacements(before),
+            dropped: ids.filter(|(_, (now, before))| **now && !**before).map(|(body, _)| body.id).collect(),
+            duration_s: (self.physics.steps() - steps_before) as f32 * TIME_STEP_S,
+            ..PushOutcome::default()
+        }
+    }
+
+    /// Moves the arm along a motion; stops when it is blocked.
+    fn ride(&mut self, arm: &Arm, motion: &Motion, notes: &mut Notes) -> Ride {
+        let steps = (motion.duration_s() / f64::from(TIME_STEP_S)).ceil() as usize;
+        let mut joints = motion.at(0.0).unwrap_or_else(|| Joints::zero(arm.joints.len()));
+        for step in 1..=steps {
+            let at_s = step as f64 * f64::from(TIME_STEP_S);
+            joints = motion.at(at_s).unwrap_or(joints);
+            let blocked = self.physics.step_arm(arm, &joints);
+            self.take_notes(notes);
+            if blocked && step < steps {
+                return Ride { joints, blocked_s: Some(at_s) };
+            }
+            self.note_drops();
+        }
+        Ride { joints, blocked_s: None }
+    }
+
+    fn take_notes(&self, notes: &mut Notes) {
+        let id = |at: usize| self.bodies.get(at).map(|body: &Body| body.id);
+        for (link, at) in self.physics.link_contacts() {
+            let known = |contact: &LinkContact| contact.link == link && Some(contact.object) == id(at);
+            if let Some(object) = id(at)
+                && !notes.contacts.iter().any(known)
+            {
+                notes.contacts.push(LinkContact { link: link.to_owned(), object });
+            }
+        }
+        for at in self.physics.pressed_against_walls(0.25 * BLOCKING_FORCE_N) {
+            if let Some(object) = id(at)
+                && !notes.against_wall.contains(&object)
+            {
+                notes.against_wall.push(object);
+            }
+        }
+        notes.arm_in_shelf_m = notes.arm_in_shelf_m.max(self.physics.arm_in_shelf_m());
+    }
+}
+
+/// What was seen on the way.
+#[derive(Default)]
+struct Notes {
+    contacts: Vec<LinkContact>,
+    against_wall: Vec<ObjectId>,
+    arm_in_shelf_m: f32,
+}
+
+/// The stops of a motion that were passed before it was blocked.
+fn before_time(motion: &Motion, blocked_s: Option<f64>) -> Vec<Joints> {
+    let until = blocked_s.unwrap_or(f64::INFINITY);
+    motion.stops.iter().filter(|stop| stop.at_s < until).map(|stop| stop.joints).collect()
+}

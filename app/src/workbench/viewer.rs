@@ -1,12 +1,14 @@
 //! Rerun's viewer inside the window: the only place that touches `re_viewer`.
 //!
-//! It is fed in memory by a [`rerun::RecordingStream`] and opens no port. Its own panels are hidden; what a person
+//! It is fed in memory by a [`rerun::RecordingStream`] and opens no port, unless it is asked to serve: then other viewers
+//! on this machine can look on, at 127.0.0.1 only. Its own panels are hidden; what a person
 //! clicks on comes back through [`Viewer::clicked`].
 
 mod linked;
 
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
 use rerun::external::{eframe, egui, re_log_channel, re_log_types, re_viewer, tokio};
+use rerun::grpc_server::GrpcServerSink;
 use rerun::{RecordingStream, RecordingStreamBuilder};
 use std::cell::RefCell;
 use std::path::Path;
@@ -14,6 +16,9 @@ use std::rc::Rc;
 
 /// The application id of the window's own recording; layouts of shared recordings go by another.
 pub const APPLICATION: &str = "nudge_workbench";
+
+/// Where it serves: this machine and no other.
+pub const LOOPBACK: &str = "127.0.0.1";
 
 /// What was clicked on in three dimensions.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,11 +38,12 @@ pub struct Viewer {
 }
 
 impl Viewer {
-    /// Sets the viewer up in a window that draws with wgpu, and gives back the stream that it shows.
+    /// Sets the viewer up in a window that draws with wgpu, and gives back the stream that it shows. With a port, what is
+    /// shown is served there as well.
     ///
     /// # Errors
     /// When there is no graphics driver that it can use.
-    pub fn new(cc: &eframe::CreationContext<'_>) -> Result<(Self, RecordingStream), String> {
+    pub fn new(cc: &eframe::CreationContext<'_>, serve: Option<u16>) -> Result<(Self, RecordingStream), String> {
         re_viewer::customize_eframe_and_setup_renderer(cc).map_err(|error| error.to_string())?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
@@ -75,7 +81,7 @@ impl Viewer {
         .map_err(|error| error.to_string())?;
         let (sender, receiver) = re_log_channel::log_channel(re_log_channel::LogSource::Sdk);
         app.add_log_receiver(receiver);
-        let stream = stream_into(sender).map_err(|error| error.to_string())?;
+        let stream = stream_into(sender, serve).map_err(|error| error.to_string())?;
         drop(_entered);
         Ok((Self { app, clicked, _runtime: runtime }, stream))
     }
@@ -124,15 +130,23 @@ fn clicked_of(item: &re_viewer::SelectionChangeItem) -> Option<Clicked> {
 
 /// A stream whose messages go straight into the viewer. Its sender may block, so nothing may be flushed on the window's
 /// own thread, which is the one that takes messages out.
-fn stream_into(sender: re_log_channel::LogSender) -> rerun::RecordingStreamResult<RecordingStream> {
+fn stream_into(
+    sender: re_log_channel::LogSender,
+    serve: Option<u16>,
+) -> rerun::RecordingStreamResult<RecordingStream> {
     let (stream, _) = RecordingStreamBuilder::new(APPLICATION).send_properties(false).memory()?;
     stream.set_log_time_enabled(false);
     stream.set_log_tick_enabled(false);
-    stream.set_sink(Box::new(rerun::sink::CallbackSink::new(move |messages: &[re_log_types::LogMsg]| {
+    let shown = rerun::sink::CallbackSink::new(move |messages: &[re_log_types::LogMsg]| {
         for message in messages {
             // The viewer is gone once the window is closed.
             let _ = sender.send(message.clone().into());
         }
-    })));
+    });
+    match serve.map(|port| GrpcServerSink::new(LOOPBACK, port, rerun::ServerOptions::default())) {
+        Some(Ok(served)) => stream.set_sinks((shown, served)),
+        // The address is a constant: there is nothing in it that could not be read.
+        Some(Err(_)) | None => stream.set_sink(Box::new(shown)),
+    }
     Ok(stream)
 }

@@ -1,7 +1,7 @@
 //! The window's frame: menus and tabs on top, the episode at the left, the clock at the bottom, and the layout's panels
 //! around the three-dimensional views.
 
-use super::App;
+use super::{App, Part};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
@@ -20,9 +20,12 @@ impl App {
         egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
         let openings: Vec<_> =
             self.openings.values().map(|opening| (opening.title.clone(), opening.activity)).collect();
-        if self.model.kept.layout == LayoutKind::Author {
+        self.parts.clear();
+        if self.model.recording.is_some() {
+            self.space_view(ui, frame);
+        } else if self.model.kept.layout == LayoutKind::Author {
             egui::CentralPanel::default().show(ui, |ui| panels::author::show(ui, &mut self.model, &mut ask));
-        } else if self.model.sessions.is_empty() {
+        } else if self.model.sessions.is_empty() || self.model.browsing {
             egui::CentralPanel::default().show(ui, |ui| {
                 panels::episode::openings(ui, &openings, &mut ask);
                 panels::scenes::show(ui, &mut self.model, &mut ask);
@@ -58,6 +61,7 @@ impl App {
         if std::mem::take(&mut self.reset_asked) {
             ctx.memory_mut(|memory| memory.reset_areas());
             ctx.data_mut(|data| data.clear());
+            self.tell_graphics(ctx);
         }
         if std::mem::take(&mut self.picture_asked) {
             ctx.send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::UserData::default()));
@@ -97,6 +101,12 @@ impl App {
                         ask.push(Command::Layout(layout));
                     }
                 }
+                if let Some(port) = self.model.serving {
+                    ui.separator();
+                    ui.label(format!("● serving 127.0.0.1:{port}")).on_hover_text(format!(
+                        "Programs on this machine can look on: rerun --connect rerun+http://127.0.0.1:{port}/proxy"
+                    ));
+                }
             });
         });
     }
@@ -131,7 +141,7 @@ impl App {
             LayoutKind::Why | LayoutKind::Gains | LayoutKind::Push | LayoutKind::Compare => 420.0,
             _ => 300.0,
         };
-        egui::Panel::right(egui::Id::new(("right", layout))).default_size(right).size_range(240.0..=700.0).show(
+        let right = egui::Panel::right(egui::Id::new(("right", layout))).default_size(right).size_range(240.0..=700.0).show(
             ui,
             |ui| {
                 scrolled(ui, "right", |ui| match layout {
@@ -148,22 +158,25 @@ impl App {
                 });
             },
         );
+        self.parts.push((Part::Right, right.response.rect));
         if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
-            egui::Panel::bottom("curves").resizable(true).default_size(170.0).size_range(110.0..=420.0).show(
+            let curves = egui::Panel::bottom("curves").resizable(true).default_size(170.0).size_range(110.0..=420.0).show(
                 ui,
                 |ui| {
                     panels::curves::show(ui, &mut self.model, ask);
                 },
             );
+            self.parts.push((Part::Curves, curves.response.rect));
         }
         if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {
-            egui::Panel::right("maps").default_size(390.0).size_range(220.0..=800.0).show(ui, |ui| {
+            let maps = egui::Panel::right("maps").default_size(390.0).size_range(220.0..=800.0).show(ui, |ui| {
                 scrolled(ui, "maps", |ui| {
                     panels::maps::show(ui, &mut self.model, ask);
                     ui.add_space(6.0);
                     panels::camera::show(ui, &mut self.model, ask);
                 });
             });
+            self.parts.push((Part::Maps, maps.response.rect));
         }
         egui::Panel::bottom("display").show(ui, |ui| {
             panels::display::show(ui, &mut self.model, self.drawn.count(crate::workbench::space::at::BELIEF), ask);
@@ -174,6 +187,7 @@ impl App {
     /// The three-dimensional views, or why there are none.
     fn space_view(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
         let started = Instant::now();
+        self.parts.push((Part::Space, ui.available_rect_before_wrap()));
         match (&mut self.viewer, frame) {
             (Some(viewer), Some(frame)) => viewer.ui(ui, frame),
             _ => {
@@ -208,6 +222,7 @@ impl App {
         {
             self.reply(reply);
         }
+        panels::windows::tasks(ctx, self.tasks.under_way(), ask);
         panels::windows::toasts(ctx, &mut self.model.toasts, ask);
         if self.model.recording.is_some() {
             egui::Area::new(egui::Id::new("recording")).anchor(egui::Align2::CENTER_TOP, [0.0, 34.0]).show(ctx, |ui| {
@@ -222,6 +237,12 @@ impl App {
                 });
             });
         }
+    }
+
+    /// Keeps the name of the graphics driver where the box about versions finds it.
+    pub(super) fn tell_graphics(&self, ctx: &egui::Context) {
+        let name = self.graphics.clone();
+        ctx.data_mut(|data| data.insert_temp(panels::windows::graphics_id(), name));
     }
 
     /// Adds a message.

@@ -44,8 +44,11 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
             ui.separator();
             ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                 egui::ScrollArea::horizontal().id_salt("steps").show(ui, |ui| {
-                    for moment in &session.moments {
-                        let step = moment.step;
+                    let last = model.last_step();
+                    for step in 0..=last {
+                        // In a comparison the longer episode goes on.
+                        let mut moments = model.on_show().filter_map(|session| session.moments.get(step));
+                        let Some(moment) = moments.next() else { break };
                         let pushed = matches!(
                             moment.outcome.as_ref().map(|outcome| outcome.record.action),
                             Some(Action::Push(_))
@@ -67,7 +70,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
                             ask.push(Command::GoTo(step));
                         }
                     }
-                    for step in session.moments.len()..=session.record.config.budget {
+                    for step in last + 1..=session.record.config.budget {
                         ui.add_enabled(
                             false,
                             egui::Label::new(egui::RichText::new(step.to_string()).monospace().weak()),

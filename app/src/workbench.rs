@@ -46,7 +46,8 @@ pub fn run(options: app::Options) -> Result<(), String> {
         .with_inner_size([1440.0, 900.0])
         .with_min_inner_size([900.0, 560.0]);
     let threads = options.threads.clone();
-    let closed = eframe::run_native("Nudge", native, Box::new(move |cc| Ok(Box::new(app::App::new(cc, options.clone())))));
+    let closed =
+        eframe::run_native("Nudge", native, Box::new(move |cc| Ok(Box::new(app::App::new(cc, options.clone())))));
     // Episodes still end their recordings.
     threads.join();
     closed.map_err(|error| error.to_string())

@@ -113,7 +113,8 @@ impl Background {
 
     /// Why jobs broke down since the last call.
     fn broke(&self) -> Vec<String> {
-        let (maps, views) = ([&self.maps, &self.other_maps], [self.preview.broke(), self.gain.broke(), self.space.broke()]);
+        let (maps, views) =
+            ([&self.maps, &self.other_maps], [self.preview.broke(), self.gain.broke(), self.space.broke()]);
         maps.into_iter().map(Latest::broke).chain(views).flatten().collect()
     }
 }

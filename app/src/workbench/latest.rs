@@ -60,7 +60,8 @@ pub struct Latest<A> {
 impl<A: Send + 'static> Latest<A> {
     /// A line without a thread; that starts with the first job and ends with this value.
     pub fn new(name: &'static str) -> Self {
-        let line = Line { asked: 0, next: None, is_running: false, answer: None, broke: None, is_closed: false, wake: None };
+        let line =
+            Line { asked: 0, next: None, is_running: false, answer: None, broke: None, is_closed: false, wake: None };
         let shared = Shared { line: Mutex::new(line), arrived: Condvar::new(), oldest_wanted: Arc::default() };
         Self { name, shared: Arc::new(shared), is_started: false }
     }

@@ -130,10 +130,7 @@ fn clicked_of(item: &re_viewer::SelectionChangeItem) -> Option<Clicked> {
 
 /// A stream whose messages go straight into the viewer. Its sender may block, so nothing may be flushed on the window's
 /// own thread, which is the one that takes messages out.
-fn stream_into(
-    sender: re_log_channel::LogSender,
-    serve: Option<u16>,
-) -> rerun::RecordingStreamResult<RecordingStream> {
+fn stream_into(sender: re_log_channel::LogSender, serve: Option<u16>) -> rerun::RecordingStreamResult<RecordingStream> {
     let (stream, _) = RecordingStreamBuilder::new(APPLICATION).send_properties(false).memory()?;
     stream.set_log_time_enabled(false);
     stream.set_log_tick_enabled(false);

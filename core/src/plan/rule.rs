@@ -90,8 +90,14 @@ mod tests {
 
     #[test]
     fn saturation_is_two_percent() {
-        assert!(saturated(100.0, 98.5, SATURATION) && saturated(98.5, 100.0, SATURATION) && saturated(0.0, 0.0, SATURATION));
+        assert!(
+            saturated(100.0, 98.5, SATURATION) && saturated(98.5, 100.0, SATURATION) && saturated(0.0, 0.0, SATURATION)
+        );
         assert!(saturated(100.0, 97.0, 0.05), "a wider threshold");
-        assert!(!saturated(100.0, 97.0, SATURATION) && !saturated(97.0, 100.0, SATURATION) && !saturated(0.0, 1.0, SATURATION));
+        assert!(
+            !saturated(100.0, 97.0, SATURATION)
+                && !saturated(97.0, 100.0, SATURATION)
+                && !saturated(0.0, 1.0, SATURATION)
+        );
     }
 }

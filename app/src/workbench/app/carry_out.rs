@@ -299,8 +299,7 @@ impl App {
     /// Runs both episodes of the comparison, as far as they can be.
     fn run_both(&mut self) {
         let ids: Vec<SessionId> = self.model.shown.into_iter().chain(self.model.other).collect();
-        let done: Vec<_> =
-            ids.into_iter().map(|id| self.order_to(id, Order::Run, Activity::Running)).collect();
+        let done: Vec<_> = ids.into_iter().map(|id| self.order_to(id, Order::Run, Activity::Running)).collect();
         if done.iter().all(Result::is_err) {
             if let Some(Err((level, words))) = done.into_iter().next() {
                 self.tell(level, words);

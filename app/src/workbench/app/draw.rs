@@ -141,9 +141,10 @@ impl App {
             LayoutKind::Why | LayoutKind::Gains | LayoutKind::Push | LayoutKind::Compare => 420.0,
             _ => 300.0,
         };
-        let right = egui::Panel::right(egui::Id::new(("right", layout))).default_size(right).size_range(240.0..=700.0).show(
-            ui,
-            |ui| {
+        let right = egui::Panel::right(egui::Id::new(("right", layout)))
+            .default_size(right)
+            .size_range(240.0..=700.0)
+            .show(ui, |ui| {
                 scrolled(ui, "right", |ui| match layout {
                     LayoutKind::Why => panels::why::show(ui, &mut self.model, ask),
                     LayoutKind::Gains => panels::gains::show(ui, &mut self.model, ask),
@@ -156,16 +157,16 @@ impl App {
                         panels::notes::show(ui, &mut self.model, ask);
                     }
                 });
-            },
-        );
+            });
         self.parts.push((Part::Right, right.response.rect));
         if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
-            let curves = egui::Panel::bottom("curves").resizable(true).default_size(170.0).size_range(110.0..=420.0).show(
-                ui,
-                |ui| {
+            let curves = egui::Panel::bottom("curves")
+                .resizable(true)
+                .default_size(170.0)
+                .size_range(110.0..=420.0)
+                .show(ui, |ui| {
                     panels::curves::show(ui, &mut self.model, ask);
-                },
-            );
+                });
             self.parts.push((Part::Curves, curves.response.rect));
         }
         if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {

@@ -236,13 +236,10 @@ impl App {
             let written = if what == MenuCommand::ExportTables {
                 export::write_tables(&session, &path).map(|_| ())
             } else {
-                let recording = path.with_file_name(format!(
-                    "{}.rrd",
-                    path.file_name().unwrap_or_default().to_string_lossy()
-                ));
-                export::write_episode(&session, &path, &|share| watch(0.5 * share)).and_then(|()| {
-                    export::write_recording(&session, &recording, &|share| watch(0.5 + 0.5 * share))
-                })
+                let recording =
+                    path.with_file_name(format!("{}.rrd", path.file_name().unwrap_or_default().to_string_lossy()));
+                export::write_episode(&session, &path, &|share| watch(0.5 * share))
+                    .and_then(|()| export::write_recording(&session, &recording, &|share| watch(0.5 + 0.5 * share)))
             };
             match written {
                 Ok(()) => (Level::Info, format!("Exported to {}", path.display())),
@@ -266,11 +263,7 @@ impl App {
     }
 
     /// Starts something that is done to the end.
-    fn task(
-        &mut self,
-        title: String,
-        work: impl FnOnce(&dyn Fn(f32) -> bool) -> (Level, String) + Send + 'static,
-    ) {
+    fn task(&mut self, title: String, work: impl FnOnce(&dyn Fn(f32) -> bool) -> (Level, String) + Send + 'static) {
         if let Err(error) = self.tasks.start(title.clone(), self.wake.clone(), work) {
             self.tell(Level::Error, format!("{title}: {error}"));
         }

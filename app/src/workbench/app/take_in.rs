@@ -166,8 +166,7 @@ impl App {
         let (typing, focused) = (ctx.text_edit_focused(), ctx.memory(|memory| memory.focused().is_some()));
         let authoring = self.model.kept.layout == LayoutKind::Author;
         // The longer ones first: a shortcut also answers to more modifiers than its own.
-        let mut entries: Vec<_> =
-            MenuCommand::all().filter_map(|entry| Some((entry, entry.shortcut()?))).collect();
+        let mut entries: Vec<_> = MenuCommand::all().filter_map(|entry| Some((entry, entry.shortcut()?))).collect();
         entries.sort_by_key(|(_, keys)| !keys.modifiers.shift);
         for (entry, keys) in entries {
             let plain = keys.modifiers.is_none();

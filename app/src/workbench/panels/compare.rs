@@ -72,7 +72,11 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) {
     };
     let run = MenuCommand::RunBoth;
     let button = ui.add_enabled(run.is_available(model), egui::Button::new(run.title()));
-    if button.on_hover_text(run.tooltip()).on_disabled_hover_text("Both are busy or have used up their budgets").clicked() {
+    if button
+        .on_hover_text(run.tooltip())
+        .on_disabled_hover_text("Both are busy or have used up their budgets")
+        .clicked()
+    {
         ask.push(Command::Menu(run));
     }
     egui::ScrollArea::vertical().id_salt("compare").auto_shrink(false).show(ui, |ui| {

@@ -6,6 +6,7 @@ use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
 use crate::workbench::panels;
+use rerun::external::re_ui::RecordingCommandKind;
 use rerun::external::{eframe, egui};
 use std::time::Instant;
 
@@ -231,7 +232,23 @@ impl App {
                     ui.horizontal(|ui| {
                         let name = self.model.recording.as_ref().map(|path| path.display().to_string());
                         ui.label(format!("Recording {}", name.unwrap_or_default()));
-                        if ui.button("Back to the episode").clicked() {
+                        let steps = [
+                            ("⏮", "Beginning of the recording", RecordingCommandKind::PlaybackBeginning),
+                            ("⏴", "A step back in the recording", RecordingCommandKind::PlaybackStepBack),
+                            ("⏯", "Play or pause the recording", RecordingCommandKind::PlaybackTogglePlayPause),
+                            ("⏵", "A step on in the recording", RecordingCommandKind::PlaybackStepForward),
+                            ("⏭", "End of the recording", RecordingCommandKind::PlaybackEndAndFollow),
+                        ];
+                        for (icon, words, kind) in steps {
+                            let button = ui.button(icon);
+                            button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, words));
+                            if let Some(viewer) = self.viewer.as_mut().filter(|_| button.on_hover_text(words).clicked())
+                            {
+                                viewer.play(kind);
+                            }
+                        }
+                        let back = if self.model.sessions.is_empty() { "Close" } else { "Back to the episode" };
+                        if ui.button(back).on_hover_text("The recording's file stays as it is").clicked() {
                             ask.push(Command::CloseRecording);
                         }
                     });

@@ -294,7 +294,7 @@ fn show_floor(
     let map = FloorMap { grid, picture, outlines, picked, apron_m: 0.0, name: &name };
     let drawn = map.show(ui, ui.available_width());
     drawn.tell(tell);
-    if let Some(cell) = drawn.over.filter(|_| drawn.response.clicked()) {
+    if let Some(cell) = drawn.chosen {
         ask.push(Command::Pick(Some(Picked::Cell(cell))));
     }
 }

@@ -7,6 +7,7 @@ mod take_in;
 #[cfg(test)]
 mod tests;
 
+use super::browser::Browser;
 use super::command::{Command, Level};
 use super::derive::Derived;
 use super::dialog::Dialog;
@@ -36,6 +37,8 @@ pub struct Options {
     pub open: Option<PathBuf>,
     /// The folder that new episodes go to.
     pub out: PathBuf,
+    /// The folder of the scenes to choose from.
+    pub scenes: PathBuf,
     /// Whether choices outlast the program.
     pub remember: bool,
     /// Light instead of dark; what is remembered otherwise.
@@ -66,6 +69,7 @@ impl Default for Options {
         Self {
             open: None,
             out: PathBuf::from("out"),
+            scenes: PathBuf::from(super::browser::FOLDER),
             remember: false,
             light: None,
             layout: None,
@@ -258,7 +262,7 @@ impl App {
         let repaint = ctx.clone();
         let wake: Wake = Arc::new(move || repaint.request_repaint());
         Self {
-            model: Model::default(),
+            model: Model { browser: Browser::of(&options.scenes), ..Model::default() },
             options,
             catalog: Arc::new(Catalog::standard()),
             workers: BTreeMap::new(),

@@ -6,7 +6,7 @@ use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
 use crate::workbench::panels;
-use rerun::external::re_ui::RecordingCommandKind;
+use rerun::external::re_viewer::external::re_ui::RecordingCommandKind;
 use rerun::external::{eframe, egui};
 use std::time::Instant;
 

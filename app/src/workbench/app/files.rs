@@ -203,7 +203,7 @@ impl App {
             MenuCommand::ExportEpisode => free(&exports, &name, ""),
             MenuCommand::ExportTables => free(&exports, &format!("{name}-tables"), ""),
             MenuCommand::SaveSceneAs => {
-                free(&Path::new("scenes").join("mine"), &self.model.author.scene().name, ".toml")
+                free(&self.options.scenes.join("mine"), &self.model.author.scene().name, ".toml")
             }
             _ => free(&exports, &format!("{name}-{}", self.model.kept.layout.title().to_lowercase()), ".png"),
         }

@@ -149,6 +149,10 @@ impl App {
 
     /// A click in three dimensions asks about the voxel.
     fn click(&mut self, clicked: &Clicked) {
+        if self.model.recording.is_some() {
+            // Of a foreign recording nothing is known but what the viewer shows.
+            return;
+        }
         let voxel = clicked.instance.and_then(|instance| self.drawn.voxel(&clicked.entity, instance));
         if let Some(voxel) = voxel {
             self.carry_out(Command::Pick(Some(Picked::Voxel(voxel))));

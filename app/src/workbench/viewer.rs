@@ -7,7 +7,9 @@
 mod linked;
 
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
-use rerun::external::re_viewer::external::re_ui::{RecordingCommand, RecordingCommandKind, RecordingCommandSender as _};
+use rerun::external::re_viewer::external::re_ui::{
+    RecordingCommand, RecordingCommandKind, RecordingCommandSender as _,
+};
 use rerun::external::{eframe, egui, re_log_channel, re_log_types, re_viewer, tokio};
 use rerun::grpc_server::GrpcServerSink;
 use rerun::{RecordingStream, RecordingStreamBuilder};

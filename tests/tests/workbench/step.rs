@@ -57,7 +57,7 @@ fn tables_are_sorted_rows_light_up_and_another_view_is_looked_from() {
     let mut window = Window::with_episode(3);
     window.click("Decide");
     let best = window.session().pending.clone().expect("a decision").action;
-    window.hover_first("View ");
+    window.hover_first(", gain ");
     let hovered = window.model().hovered;
     assert!(matches!(hovered, nudge::workbench::model::Hovered::View(_)), "{hovered:?}");
     // Falling by gain at first; by number after a click on that heading, the largest first.
@@ -76,7 +76,7 @@ fn tables_are_sorted_rows_light_up_and_another_view_is_looked_from() {
     let other = numbers.iter().copied().map(|n| ViewId(n as u16)).find(|view| best != Action::Look { view: *view });
     let other = other.expect("another view");
     window.click_first(&format!("View {}, gain", other.0));
-    window.click("Look from this");
+    window.click("Look from here");
     let step = &window.session().record.steps[0];
     assert_eq!((step.action, step.decision.reason), (Action::Look { view: other }, Reason::Manual));
     assert_eq!(step.decision.gains.len(), 300, "what was weighed is kept");

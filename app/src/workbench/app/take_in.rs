@@ -13,6 +13,8 @@ use crate::workbench::worker::{Event, Opened};
 use rerun::external::egui;
 use std::sync::{Arc, PoisonError};
 
+/// Frames after everything is done before a script's picture is taken, so that what was logged is drawn.
+const CALM_FRAMES: usize = 20;
 /// How many states keep their maps and full beliefs.
 const DERIVED_KEPT: usize = 6;
 
@@ -317,8 +319,8 @@ impl App {
         }
         self.script_frames += 1;
         match self.script_frames {
-            40 => (self.picture_to, self.picture_asked) = (Some((Part::Window, script.picture)), true),
-            41.. if self.picture_to.is_none() => {
+            CALM_FRAMES => (self.picture_to, self.picture_asked) = (Some((Part::Window, script.picture)), true),
+            frames if frames > CALM_FRAMES && self.picture_to.is_none() => {
                 (self.may_quit, self.quit_asked) = (true, true);
             }
             _ => {}

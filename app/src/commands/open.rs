@@ -1,6 +1,8 @@
 //! `nudge` and `nudge open FILE`: the workbench.
 
+use crate::workbench::app::FormOptions;
 use anyhow::Context;
+use nudge_core::plan::PolicyKind;
 use std::path::PathBuf;
 
 /// What was typed.
@@ -8,6 +10,15 @@ use std::path::PathBuf;
 pub struct Args {
     /// A scene (.toml), an episode's directory, or a recording (.rrd)
     pub file: Option<PathBuf>,
+    /// The rule that chooses actions (default: the one chosen last)
+    #[arg(long)]
+    pub policy: Option<PolicyKind>,
+    /// Number of actions (default: the one chosen last)
+    #[arg(long)]
+    pub budget: Option<usize>,
+    /// Seed of every random choice (default: the one chosen last)
+    #[arg(long)]
+    pub seed: Option<u64>,
     /// The folder that new episodes go to
     #[arg(long, default_value = "out")]
     pub out: PathBuf,
@@ -39,6 +50,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let options = crate::workbench::app::Options {
         open: args.file.clone(),
+        form: FormOptions { policy: args.policy, budget: args.budget, seed: args.seed },
         out: args.out.clone(),
         remember: args.picture.is_none(),
         script: args.picture.clone().map(|picture| crate::workbench::app::Script { steps: args.steps, picture }),

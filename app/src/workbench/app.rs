@@ -20,6 +20,7 @@ use super::threads::Threads;
 use super::viewer::Viewer;
 use super::worker::{Event, Worker};
 use nudge_core::camera::ViewId;
+use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
 use rerun::external::{eframe, egui};
 use std::collections::{BTreeMap, BTreeSet};
@@ -35,6 +36,8 @@ const STORAGE_KEY: &str = "nudge workbench";
 pub struct Options {
     /// A scene, an episode or a recording to open.
     pub open: Option<PathBuf>,
+    /// With what an episode is started; what is remembered otherwise.
+    pub form: FormOptions,
     /// The folder that new episodes go to.
     pub out: PathBuf,
     /// The folder of the scenes to choose from.
@@ -55,6 +58,17 @@ pub struct Options {
     pub threads: Threads,
 }
 
+/// Choices for the first episode that were made before the window opened.
+#[derive(Clone, Debug, Default)]
+pub struct FormOptions {
+    /// The rule that chooses actions.
+    pub policy: Option<PolicyKind>,
+    /// Number of actions.
+    pub budget: Option<usize>,
+    /// Seed of every random choice.
+    pub seed: Option<u64>,
+}
+
 /// Something to do before the program ends by itself.
 #[derive(Clone, Debug)]
 pub struct Script {
@@ -68,6 +82,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             open: None,
+            form: FormOptions::default(),
             out: PathBuf::from("out"),
             scenes: PathBuf::from(super::browser::FOLDER),
             remember: false,
@@ -213,6 +228,7 @@ pub struct App {
     frame_ms: Option<f32>,
     /// Milliseconds that the viewer took of the last frame.
     viewer_ms: f32,
+    last_viewer_ms: f32,
     picture_to: Option<(Part, PathBuf)>,
     /// Frames since the script has nothing more to do.
     script_frames: usize,
@@ -287,6 +303,7 @@ impl App {
             may_quit: false,
             frame_ms: None,
             viewer_ms: 0.0,
+            last_viewer_ms: 0.0,
             picture_to: None,
             script_frames: 0,
             picture_asked: false,
@@ -304,6 +321,10 @@ impl App {
         if let Some(layout) = self.options.layout {
             self.model.kept.layout = layout;
         }
+        let (form, chosen) = (&mut self.model.kept.form, &self.options.form);
+        form.policy = chosen.policy.unwrap_or(form.policy);
+        form.budget = chosen.budget.unwrap_or(form.budget);
+        form.seed = chosen.seed.unwrap_or(form.seed);
         self.model.author.wake_with(self.wake.clone());
         if let Some(path) = self.options.open.clone() {
             self.carry_out(Command::Open(path));
@@ -341,6 +362,17 @@ impl App {
     /// Milliseconds that the window's own part of the last frame took, the viewer's left out.
     pub fn last_frame_ms(&self) -> Option<f32> {
         self.frame_ms
+    }
+
+    /// Milliseconds that the viewer's views took of the last frame, on the processor.
+    pub fn last_viewer_ms(&self) -> f32 {
+        self.last_viewer_ms
+    }
+
+    /// Whether maps and three-dimensional views show the state at the cursor.
+    pub fn is_shown(&self) -> bool {
+        let key = self.model.session().map(|session| (session.id, session.moment(self.model.cursor).step));
+        key.is_none_or(|key| self.model.derived.contains_key(&key) && !self.background.space.is_busy())
     }
 
     /// Why the program should not end without asking: what would be lost.

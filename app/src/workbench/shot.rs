@@ -93,7 +93,8 @@ fn open(harness: &mut Harness<'_, App>, path: &std::path::Path) -> Result<()> {
     harness.state_mut().ask(Command::Open(path.to_owned()));
     settle(harness)?;
     let app = harness.state_mut();
-    if app.model.sessions.len() > before || app.model.kept.layout == LayoutKind::Author {
+    let edited = app.model.kept.layout == LayoutKind::Author && app.model.author.path().is_some();
+    if app.model.sessions.len() > before || edited {
         return Ok(());
     }
     let said = app.model.toasts.shown().last().map(|toast| toast.text.clone());

@@ -45,6 +45,7 @@ impl App {
             self.carry_out(command);
         }
         let viewer_ms = std::mem::take(&mut self.viewer_ms);
+        self.last_viewer_ms = viewer_ms;
         if let Some(taken) = &mut self.frame_ms {
             *taken += started.elapsed().as_secs_f32() * 1e3 - viewer_ms;
         }

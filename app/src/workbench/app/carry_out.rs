@@ -65,12 +65,7 @@ impl App {
             }
             Command::Note(step, text) => self.note(step, text),
             Command::Overrule(step, object, verdict) => self.overrule(step, object, verdict),
-            Command::CloseRecording => {
-                self.model.recording = None;
-                if let Some(viewer) = &mut self.viewer {
-                    viewer.close_recording();
-                }
-            }
+            Command::CloseRecording => self.close_recording(),
             Command::TryScene => self.try_scene(),
             Command::EditScene => self.edit_scene(),
             Command::Browse(browsing) => self.model.browsing = browsing,
@@ -86,7 +81,16 @@ impl App {
     fn lay_out(&mut self, layout: LayoutKind) {
         self.model.kept.layout = layout;
         self.model.browsing = false;
+        self.close_recording();
         self.model.cursor = self.model.cursor.min(self.model.last_step());
+    }
+
+    fn close_recording(&mut self) {
+        if self.model.recording.take().is_some()
+            && let Some(viewer) = &mut self.viewer
+        {
+            viewer.close_recording();
+        }
     }
 
     pub(super) fn menu(&mut self, entry: MenuCommand) {
@@ -174,7 +178,7 @@ impl App {
         let id = SessionId(self.next_id);
         self.next_id += 1;
         self.openings.insert(id, Opening { title, activity: Activity::Opening { done: 0, of: 0 } });
-        self.model.recording = None;
+        self.close_recording();
         self.model.browsing = false;
         self.begun.insert(begin.path().to_owned());
         let (events, wake) = (self.events.0.clone(), self.wake.clone());
@@ -205,7 +209,9 @@ impl App {
                 self.model.kept.form.scene = Some(path.to_owned());
                 let policy = self.model.kept.form.policy;
                 match against {
-                    None => drop(self.start_scene(scene, policy)),
+                    None => {
+                        self.start_scene(scene, policy);
+                    }
                     Some(against) => {
                         let ids = [self.start_scene(scene.clone(), policy), self.start_scene(scene, against)];
                         self.pairs.push(Pair { ids });
@@ -285,6 +291,9 @@ impl App {
         let worker = self.workers.get(&id);
         let worker = worker.ok_or((Level::Warning, "This episode takes no more orders; branch from it to go on"))?;
         let session = self.model.session_of_mut(id).ok_or((Level::Warning, "The episode is not open"))?;
+        if session.read_only.is_some() {
+            return Err((Level::Warning, "This episode can only be looked at; branch from it to go on"));
+        }
         if session.activity != Activity::Idle {
             return Err((Level::Info, "The episode is busy; cancel first"));
         }

@@ -40,7 +40,9 @@ impl App {
 
     fn hear(&mut self, id: SessionId, event: Event) {
         match event {
-            Event::Opened(opened) => self.opened(id, *opened),
+            // One that was closed meanwhile has no worker any more.
+            Event::Opened(opened) if self.workers.contains_key(&id) => self.opened(id, *opened),
+            Event::Opened(_) => {}
             Event::Activity(activity) => {
                 if let Some(opening) = self.openings.get_mut(&id) {
                     opening.activity = activity;
@@ -164,6 +166,11 @@ impl App {
             self.carry_out(Command::GainOf(nudge_core::camera::ViewId(view as u16)));
         } else if clicked.entity == crate::workbench::space::at::CANDIDATES {
             self.model.candidate = clicked.instance;
+            let decision = self.model.session().and_then(|session| session.decision_after(self.model.cursor));
+            let candidate = clicked.instance.and_then(|at| decision?.candidates.get(at));
+            if let Some(push) = candidate.map(|candidate| candidate.push) {
+                self.carry_out(Command::Preview(push));
+            }
         }
     }
 

@@ -27,7 +27,7 @@ pub fn openings(ui: &mut egui::Ui, openings: &[(String, Activity)], ask: &mut Ve
                 ui.add(egui::Spinner::new());
             }
         }
-        if ui.button("Cancel opening").clicked() {
+        if ui.button("Cancel opening").on_hover_text("Stop repeating its log; its directory stays as it is").clicked() {
             ask.push(Command::Cancel);
         }
         ui.separator();
@@ -176,15 +176,17 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
         let label = ui.label("budget");
         ui.add(egui::DragValue::new(&mut form.budget).range(1..=200).suffix(" actions"))
             .labelled_by(label.id)
-            .on_hover_text("Number of actions, 20 for a robot, 40 in simulation");
+            .on_hover_text("Number of actions, 1 to 200; 20 for a robot, 40 in simulation");
         ui.end_row();
         let label = ui.label("seed");
-        ui.add(egui::DragValue::new(&mut form.seed)).labelled_by(label.id).on_hover_text("Seed of every random choice");
+        ui.add(egui::DragValue::new(&mut form.seed))
+            .labelled_by(label.id)
+            .on_hover_text("Seed of every random choice, any whole number from 0");
         ui.end_row();
         let label = ui.label("candidates");
         ui.add(egui::DragValue::new(&mut form.planner.candidates).range(0..=1000))
             .labelled_by(label.id)
-            .on_hover_text("Push candidates drawn per decision, k = 80");
+            .on_hover_text("Push candidates drawn per decision, 0 to 1000; k = 80 in the paper");
         ui.end_row();
         let label = ui.label("γ");
         ui.add(egui::DragValue::new(&mut form.planner.gamma).range(0.0..=10.0).speed(0.01))
@@ -195,10 +197,14 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
     ui.collapsing("Thresholds", |ui| thresholds(ui, &mut form.planner));
 }
 
+/// A share between 0 and 1.
+fn share(value: &mut f32) -> egui::DragValue<'_> {
+    egui::DragValue::new(value).range(0.0..=1.0).speed(0.005).fixed_decimals(2)
+}
+
 /// The planner's thresholds.
 fn thresholds(ui: &mut egui::Ui, planner: &mut PlannerSettings) {
     egui::Grid::new("thresholds").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
-        let share = |value: &mut f32| egui::DragValue::new(value).range(0.0..=1.0).speed(0.005).fixed_decimals(2);
         let label = ui.label("certain above");
         ui.add(share(&mut planner.certain))
             .labelled_by(label.id)

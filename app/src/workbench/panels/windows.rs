@@ -51,17 +51,24 @@ fn write_to(ui: &mut egui::Ui, what: MenuCommand, path: &mut String, part: &mut 
     }
     ui.horizontal(|ui| {
         let label = ui.label("Write to");
-        ui.add(egui::TextEdit::singleline(path).desired_width(340.0)).labelled_by(label.id);
+        ui.add(egui::TextEdit::singleline(path).desired_width(340.0))
+            .labelled_by(label.id)
+            .on_hover_text("A path; folders on the way are made");
         if ui.button("Browse…").on_hover_text("Choose a place in the system's dialog").clicked() {
             reply = Some(Reply::Browse(what));
         }
     });
     ui.add_space(6.0);
     ui.horizontal(|ui| {
-        if ui.add_enabled(!path.trim().is_empty(), egui::Button::new("Write")).clicked() {
+        if ui
+            .add_enabled(!path.trim().is_empty(), egui::Button::new("Write"))
+            .on_hover_text("Write it there")
+            .on_disabled_hover_text("Type a path first")
+            .clicked()
+        {
             reply = Some(Reply::Write(what, PathBuf::from(path.trim()), *part));
         }
-        if ui.button("Do not write").clicked() {
+        if ui.button("Do not write").on_hover_text("Nothing is written").clicked() {
             reply = Some(Reply::Close);
         }
     });
@@ -102,13 +109,13 @@ fn quit(ui: &mut egui::Ui, lost: &[String]) -> Option<Reply> {
     ui.add_space(6.0);
     let mut reply = None;
     ui.horizontal(|ui| {
-        if ui.button("Save and quit").clicked() {
+        if ui.button("Save and quit").on_hover_text("Writes the notes and the scene, then ends").clicked() {
             reply = Some(Reply::SaveAndQuit);
         }
-        if ui.button("Quit without saving").clicked() {
+        if ui.button("Quit without saving").on_hover_text("What is listed is lost").clicked() {
             reply = Some(Reply::Quit);
         }
-        if ui.button("Stay").clicked() {
+        if ui.button("Stay").on_hover_text("Goes back to the window").clicked() {
             reply = Some(Reply::Close);
         }
     });
@@ -214,7 +221,7 @@ pub fn toasts(ctx: &egui::Context, toasts: &mut Toasts, _ask: &mut Vec<Command>)
                     ui.label(&toast.text);
                     let close = ui.small_button("×");
                     close.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, "Close message"));
-                    if close.clicked() {
+                    if close.on_hover_text("Close this message").clicked() {
                         closed = Some(toast.text.clone());
                     }
                 });

@@ -66,7 +66,7 @@ fn tables_are_written_as_csv() {
 
 #[test]
 fn an_export_is_cancelled_and_leaves_nothing() {
-    let mut window = Window::with_episode(12);
+    let mut window = Window::with_quick_episode(12);
     window.click("Run");
     window.key(Modifiers::COMMAND, Key::E);
     window.press("Write");

@@ -10,9 +10,7 @@ use std::path::Path;
 
 /// A window whose scenes are an empty folder of its own.
 fn window() -> Window {
-    let window = Window::new();
-    let scenes = window.folder.path().join("scenes");
-    std::fs::create_dir(&scenes).expect("made");
+    let scenes = tempfile::tempdir().expect("folder").keep();
     let mut window = Window::with_scenes(&scenes);
     window.layout(LayoutKind::Author);
     window

@@ -84,7 +84,7 @@ fn tables_are_sorted_rows_light_up_and_another_view_is_looked_from() {
 
 #[test]
 fn a_run_is_paused_and_cancelled_and_goes_on() {
-    let mut window = Window::with_episode(30);
+    let mut window = Window::with_quick_episode(30);
     window.press("Run");
     window.wait_for("a step", |app| app.model.session().is_some_and(|session| session.steps() >= 1));
     assert!(window.sees("running"));

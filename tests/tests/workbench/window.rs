@@ -6,6 +6,7 @@ use nudge::workbench::app::{App, Options};
 use nudge::workbench::command::Command;
 use nudge::workbench::model::{LayoutKind, Model};
 use nudge::workbench::session::Session;
+use nudge_core::plan::PolicyKind;
 use nudge_tests::root;
 use rerun::external::egui::{self, Key, Modifiers, vec2};
 use std::path::{Path, PathBuf};
@@ -50,6 +51,15 @@ impl Window {
     pub fn with_episode(budget: usize) -> Self {
         let mut window = Self::new();
         window.app().model.kept.form.budget = budget;
+        window.open(&root().join(SCENE));
+        window
+    }
+
+    /// A window with an episode of the policy that decides fastest.
+    pub fn with_quick_episode(budget: usize) -> Self {
+        let mut window = Self::new();
+        let form = &mut window.app().model.kept.form;
+        (form.budget, form.policy) = (budget, PolicyKind::MemNoPush);
         window.open(&root().join(SCENE));
         window
     }
@@ -128,15 +138,21 @@ impl Window {
 
     /// Clicks on what has exactly this label, and waits for nothing.
     pub fn press(&mut self, label: &str) {
-        let node = self.harness.get_by_label(label);
-        click_on(&node);
+        self.harness.get_by_label(label).scroll_to_me();
+        self.harness.run_steps(2);
+        click_on(&self.harness.get_by_label(label));
         self.harness.run_steps(2);
     }
 
     /// Clicks on the first of what has this in its label.
     pub fn click_first(&mut self, label: &str) {
-        let node = self.harness.query_all_by_label_contains(label).next();
-        click_on(&node.unwrap_or_else(|| panic!("nothing on the window has {label} in its label")));
+        let first = |window: &Self, then: &dyn Fn(&Node<'_>)| {
+            let node = window.harness.query_all_by_label_contains(label).next();
+            then(&node.unwrap_or_else(|| panic!("nothing on the window has {label} in its label")));
+        };
+        first(self, &|node| node.scroll_to_me());
+        self.harness.run_steps(2);
+        first(self, &click_on);
         self.harness.run_steps(2);
         self.wait();
     }
@@ -188,11 +204,7 @@ impl Window {
 
     /// What a click on the window's cross leads to: whether it closes.
     pub fn closes(&mut self) -> bool {
-        let events = |window: &mut Self| {
-            let input = window.harness.input_mut();
-            input.viewports.entry(egui::ViewportId::ROOT).or_default().events.clone()
-        };
-        assert!(events(self).is_empty());
+        self.harness.run_steps(1);
         let root = egui::ViewportId::ROOT;
         self.harness.input_mut().viewports.entry(root).or_default().events.push(egui::ViewportEvent::Close);
         self.harness.step();

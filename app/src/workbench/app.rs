@@ -327,6 +327,10 @@ impl App {
         form.seed = chosen.seed.unwrap_or(form.seed);
         self.model.author.wake_with(self.wake.clone());
         if let Some(path) = self.options.open.clone() {
+            if self.options.layout.is_none() && self.model.kept.layout == LayoutKind::Author {
+                // Remembered from the last time; what is named on the command line is to be seen, not edited.
+                self.model.kept.layout = LayoutKind::Episode;
+            }
             self.carry_out(Command::Open(path));
         }
     }

@@ -339,7 +339,8 @@ impl Recorder {
     }
 
     fn check<T>(&self, result: std::result::Result<T, impl std::fmt::Display>) -> Result<T> {
-        result.map_err(|error| Error::io(&self.file, std::io::Error::other(error.to_string())))
+        // The file is written by a thread of the SDK's, which does not tell why it ended; mostly the disk is full.
+        result.map_err(|error| Error::input(&self.file, "", format!("the recording cannot be written ({error})")))
     }
 }
 

@@ -6,14 +6,15 @@ VENV  := $(CARGO_TARGET_DIR)/venv
 # The window with Rerun's viewer inside: about 1,000 crates. Without it the build is headless.
 WINDOW := --features nudge-tests/workbench
 
-.PHONY: help setup graphics python demo workbench test test-window bench bench-window lint
+.PHONY: help setup graphics python demo workbench test test-window bench bench-window lint lint-window
 help:
 	@echo 'make demo        map a crowded shelf: prints the table, writes out/demo/'
 	@echo 'make workbench   build and open the window (the first build takes about 45 minutes on two cores)'
 	@echo 'make test        all tests of the headless build'
 	@echo 'make test-window those of the window too'
 	@echo 'make bench       the speed of the parts that matter, beside their targets'
-	@echo 'make lint        formatting, clippy and documentation without warnings'
+	@echo 'make bench-window what the window costs: frames, latency, memory'
+	@echo 'make lint        formatting, clippy and documentation without warnings (make lint-window: of the window)'
 
 setup:
 	@scripts/setup.sh build
@@ -45,9 +46,14 @@ bench: setup
 	cargo bench --locked --workspace --bench gain --bench speed
 
 bench-window: graphics
-	cargo bench --locked --workspace $(WINDOW) --bench window
+	cargo build --release --locked --workspace $(WINDOW)
+	NUDGE_BIN=$(NUDGE) cargo bench --locked --workspace $(WINDOW) --bench window
 
 lint: setup
 	cargo fmt --all --check
 	cargo clippy --release --locked --workspace --all-targets -- -D warnings
 	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps
+
+lint-window: graphics
+	cargo clippy --release --locked --workspace --all-targets $(WINDOW) -- -D warnings
+	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps $(WINDOW)

@@ -114,6 +114,7 @@ impl Played {
             moments: self.moments.clone(),
             pending: self.pending.clone(),
             activity: Activity::Idle,
+            read_only: None,
             annotations: super::annotations::Annotations::default(),
             unsaved: false,
         }

@@ -89,7 +89,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
             seed: u64::MAX,
             budget: 4,
             views: "standard300".to_owned(),
-            planner: PlannerSettings { candidates: 80, gamma: 0.2 },
+            planner: PlannerSettings::default(),
             noise: None,
         },
         prior: scores(0),

@@ -116,7 +116,7 @@ fn because(reason: Reason) -> String {
     match reason {
         Reason::LookTellsMore | Reason::PushTellsMore | Reason::MapComplete => words::reason(reason).to_owned(),
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
-        Reason::TooEarly => "nothing is pushed in the first three steps".to_owned(),
+        Reason::TooEarly => "nothing is pushed in the first steps".to_owned(),
         Reason::LastStep => "nothing is pushed in the last step".to_owned(),
         Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
         Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),

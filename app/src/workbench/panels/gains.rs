@@ -192,6 +192,17 @@ impl<'a> HeatMap<'a> {
             let pointed = over.map(|view| view.id).or(self.hovered);
             views.iter().filter(|view| pointed == Some(view.id)).for_each(|view| ring(view, 1.0));
         }
+        if let Some([right, up]) = super::arrows(ui, &response) {
+            let slot = views
+                .iter()
+                .find(|view| self.selected == Some(view.id))
+                .map_or([0, 0], |view| [i64::from(view.slot[0]), i64::from(view.slot[1])]);
+            let wanted = [slot[0] + i64::from(right), slot[1] + i64::from(up)];
+            let beside = |view: &&&View| [i64::from(view.slot[0]), i64::from(view.slot[1])] == wanted;
+            touched.view = views.iter().find(beside).map(|view| view.id);
+        } else if response.clicked() && over.is_none() {
+            touched.view = views.first().map(|view| view.id);
+        }
         if let Some(view) = over {
             touched.over = Some(Hovered::View(view.id));
             let text = format!("View {}: {}{}", view.id.0, words::nats(self.gain(view.id)), self.note(view.id));

@@ -159,9 +159,7 @@ fn map(
             value(derived, &moment.truth, session, shown, cell)
         )
     });
-    if drawn.response.clicked()
-        && let Some(cell) = drawn.over
-    {
+    if let Some(cell) = drawn.chosen {
         ask.push(Command::Pick(Some(Picked::Cell(cell))));
     }
     map_legend(ui, shown, &grid);

@@ -287,7 +287,7 @@ impl Here<'_> {
                     let change = words::probability(change_at(prediction, &grid, cell));
                     format!("{}\nchanges with probability {change}", words::cell_place(&grid, grid.cell(cell)))
                 });
-                if let Some(cell) = drawn.over.filter(|_| drawn.response.clicked()) {
+                if let Some(cell) = drawn.chosen {
                     ask.push(Command::Pick(Some(Picked::Cell(cell))));
                 }
             });

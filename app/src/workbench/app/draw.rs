@@ -147,18 +147,19 @@ impl App {
             .default_size(right)
             .size_range(240.0..=700.0)
             .show(ui, |ui| {
-                scrolled(ui, "right", |ui| match layout {
+                ui.add_space(4.0);
+                match layout {
                     LayoutKind::Why => panels::why::show(ui, &mut self.model, ask),
                     LayoutKind::Gains => panels::gains::show(ui, &mut self.model, ask),
                     LayoutKind::Push => panels::push::show(ui, &mut self.model, ask),
                     LayoutKind::Compare => panels::compare::show(ui, &mut self.model, ask),
-                    LayoutKind::Episode | LayoutKind::Author => {
+                    LayoutKind::Episode | LayoutKind::Author => scrolled(ui, "right", |ui| {
                         panels::decision::show(ui, &mut self.model, ask);
                         ui.add_space(8.0);
                         ui.separator();
                         panels::notes::show(ui, &mut self.model, ask);
-                    }
-                });
+                    }),
+                }
             });
         self.parts.push((Part::Right, right.response.rect));
         if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
@@ -172,7 +173,7 @@ impl App {
             self.parts.push((Part::Curves, curves.response.rect));
         }
         if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {
-            let maps = egui::Panel::right("maps").default_size(390.0).size_range(220.0..=800.0).show(ui, |ui| {
+            let maps = egui::Panel::right("maps").default_size(340.0).size_range(220.0..=800.0).show(ui, |ui| {
                 scrolled(ui, "maps", |ui| {
                     panels::maps::show(ui, &mut self.model, ask);
                     ui.add_space(6.0);

@@ -45,15 +45,13 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         return touched;
     };
     let gamma = session.record.config.planner.gamma;
-    egui::ScrollArea::vertical().id_salt("decision").auto_shrink(false).show(ui, |ui| {
-        ui.spacing_mut().item_spacing.y = 4.0;
-        header(ui, session, model.cursor);
-        verdict(ui, decision, gamma);
-        ui.add_space(4.0);
-        views(state, ui, model, session, decision, &mut touched, ask);
-        ui.add_space(4.0);
-        pushes(state, ui, model, session, decision, &mut touched, ask);
-    });
+    ui.spacing_mut().item_spacing.y = 4.0;
+    header(ui, session, model.cursor);
+    verdict(ui, decision, gamma);
+    ui.add_space(4.0);
+    views(state, ui, model, session, decision, &mut touched, ask);
+    ui.add_space(4.0);
+    pushes(state, ui, model, session, decision, &mut touched, ask);
     touched
 }
 

@@ -14,7 +14,7 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
     let at = |path: &str| format!("{root}/{path}");
     let space = |name: &str, shown: &[&str]| {
         let always = [paths::SHELF, paths::SHELF_EDGES];
-        Part::View(spatial(name, root, always.iter().chain(shown).map(|path| at(path)).collect()))
+        Part::View(spatial(name, root, 1.0, always.iter().chain(shown).map(|path| at(path)).collect()))
     };
     let objects = "world/objects/**";
     let spaces = Part::Tabs(vec![
@@ -116,11 +116,17 @@ fn root_or_slash(root: &str) -> &str {
 }
 
 /// A view into the shelf from the robot's side, slightly above, with a 10 cm grid on the board.
-pub(crate) fn spatial(name: &str, root: &str, contents: Vec<String>) -> View {
+///
+/// `distance` is how far the eye is from the middle of the shelf, as a factor of what shows all of it in a view that is at
+/// least as wide as high.
+pub(crate) fn spatial(name: &str, root: &str, distance: f32, contents: Vec<String>) -> View {
+    const TARGET: [f32; 3] = [0.0, 0.16, 0.11];
+    const TO_EYE: [f32; 3] = [0.0, -0.94, 0.49];
+    let position: [f32; 3] = std::array::from_fn(|axis| TARGET[axis] + distance * TO_EYE[axis]);
     let eye = bp::EyeControls3D::new()
         .with_kind(bpc::Eye3DKind::Orbital)
-        .with_position([0.0, -0.78, 0.60])
-        .with_look_target([0.0, 0.16, 0.11])
+        .with_position(position)
+        .with_look_target(TARGET)
         .with_eye_up([0.0, 0.0, 1.0]);
     let grid = bp::LineGrid3D::new()
         .with_visible(true)

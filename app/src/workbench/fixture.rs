@@ -169,7 +169,7 @@ pub fn answer(model: &mut Model) {
     });
     let source = model.view.map(|view| {
         let nats = gain_per_voxel(&GainField::new(&belief), &session.setup.views, view, RayDensity::FULL);
-        GainSource { of: (session.id, step), view, nats: Arc::new(nats) }
+        GainSource::new((session.id, step), view, nats)
     });
     model.preview = preview;
     model.gain_source = source;

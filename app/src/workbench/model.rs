@@ -191,6 +191,16 @@ pub struct GainSource {
     pub view: ViewId,
     /// Nats by voxel.
     pub nats: Arc<Vec<(usize, f32)>>,
+    /// The top of the colour scale, nats; see [`crate::record::voxels::gain_top`].
+    pub top: f32,
+}
+
+impl GainSource {
+    /// The gain of a view under the belief after a step of an episode, by voxel in nats.
+    pub fn new(of: (SessionId, usize), view: ViewId, nats: Vec<(usize, f32)>) -> Self {
+        let top = crate::record::voxels::gain_top(&nats);
+        Self { of, view, nats: Arc::new(nats), top }
+    }
 }
 
 /// What is remembered from one start of the program to the next.

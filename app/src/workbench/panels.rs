@@ -107,6 +107,16 @@ fn arrows(ui: &egui::Ui, response: &egui::Response) -> Option<[i32; 2]> {
     })
 }
 
+/// Gives the buttons that follow in `ui` a ground, so that what can be pressed looks like it.
+fn framed(ui: &mut egui::Ui) {
+    let visuals = ui.visuals_mut();
+    let ground = visuals.text_color().gamma_multiply(0.14);
+    for state in [&mut visuals.widgets.inactive, &mut visuals.widgets.noninteractive] {
+        state.weak_bg_fill = ground;
+        state.bg_fill = ground;
+    }
+}
+
 /// The heading of a part of a panel; the tooltip says what it is.
 fn heading(ui: &mut egui::Ui, title: impl Into<String>, hint: &str) -> egui::Response {
     let heading = ui.label(egui::RichText::new(title).strong());

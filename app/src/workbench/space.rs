@@ -79,6 +79,8 @@ impl Side {
 pub struct Space {
     /// The layout.
     pub layout: LayoutKind,
+    /// Width over height of the place for the three-dimensional views.
+    pub aspect: f32,
     /// The episode that is shown.
     pub side: Option<Side>,
     /// The second one of a comparison.
@@ -125,8 +127,8 @@ impl Drawn {
 pub struct Painter {
     stream: RecordingStream,
     drawn: Drawn,
-    /// The views that are there.
-    layout: Option<LayoutKind>,
+    /// The views that are there, and how far from the shelf their eyes began.
+    layout: Option<(LayoutKind, f32)>,
     /// What every entity was last drawn from, as words.
     keys: BTreeMap<&'static str, String>,
     /// The last beliefs in full precision.
@@ -141,8 +143,8 @@ impl Painter {
 
     /// Logs what differs from the last call.
     pub fn paint(&mut self, space: &Space) {
-        if let Some((views, layout)) = space_layout::of(space.layout)
-            && self.layout.replace(views) != Some(views)
+        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect)
+            && self.layout.replace((views, distance)) != Some((views, distance))
             && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
         {
             eprintln!("warning: layout: {error}");

@@ -379,8 +379,8 @@ impl App {
         self.asked_gain = Some((of, view));
         self.background.gain.ask(move |_| {
             let field = GainField::new(&moment.belief.belief());
-            let nats = Arc::new(gain_per_voxel(&field, &views, view, RayDensity::FULL));
-            Some(GainSource { of, view, nats })
+            let nats = gain_per_voxel(&field, &views, view, RayDensity::FULL);
+            Some(GainSource::new(of, view, nats))
         });
     }
 

@@ -140,8 +140,9 @@ impl App {
     fn layout(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>, ask: &mut Vec<Command>) {
         let layout = self.model.kept.layout;
         let right = match layout {
-            LayoutKind::Why | LayoutKind::Gains | LayoutKind::Push | LayoutKind::Compare => 420.0,
-            _ => 300.0,
+            LayoutKind::Gains => 460.0,
+            LayoutKind::Why | LayoutKind::Push | LayoutKind::Compare => 420.0,
+            _ => 330.0,
         };
         let right = egui::Panel::right(egui::Id::new(("right", layout)))
             .default_size(right)
@@ -165,8 +166,8 @@ impl App {
         if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
             let curves = egui::Panel::bottom("curves")
                 .resizable(true)
-                .default_size(170.0)
-                .size_range(110.0..=420.0)
+                .default_size(190.0)
+                .size_range(130.0..=420.0)
                 .show(ui, |ui| {
                     panels::curves::show(ui, &mut self.model, ask);
                 });

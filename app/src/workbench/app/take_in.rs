@@ -259,6 +259,9 @@ impl App {
     /// Asks for the three-dimensional views, if something about them has changed.
     fn space(&mut self) {
         let Some(painter) = &self.painter else { return };
+        // Where the views are is known once they were drawn.
+        let place = self.parts.iter().find(|(part, _)| *part == Part::Space).map(|(_, rect)| rect.aspect_ratio());
+        let Some(aspect) = place.filter(|aspect| aspect.is_finite()) else { return };
         let model = &self.model;
         let side = |session: &Session| {
             let moment = session.moment(model.cursor).clone();
@@ -275,7 +278,7 @@ impl App {
         };
         let kept = &model.kept;
         let key = format!(
-            "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            "{:?} {aspect:.2} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             kept.layout,
             model.session().map(|session| (session.id, session.steps(), session.pending.is_some())),
             model.other_session().map(|session| (session.id, session.steps())),
@@ -294,6 +297,7 @@ impl App {
         self.asked_space = key;
         let space = Space {
             layout: kept.layout,
+            aspect,
             side: model.session().map(side),
             other: model.other_session().filter(|_| kept.layout == LayoutKind::Compare).map(side),
             display: kept.display.clone(),

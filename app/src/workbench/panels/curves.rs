@@ -24,6 +24,7 @@ pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
         SHARES.iter().filter_map(|key| SERIES.iter().find(|series| series.key == *key)).collect();
     let entropy: Vec<&Series> = SERIES.iter().filter(|series| series.key == ENTROPY).collect();
     let gap = 12.0;
+    ui.set_min_height(ui.available_height());
     // Measured from the panel's own edge: what is drawn must never be taller than the panel, or the panel would grow with
     // every frame.
     let (top, bottom) = (ui.cursor().top(), ui.max_rect().bottom());
@@ -105,6 +106,7 @@ impl Curves<'_> {
             .custom_x_axes(vec![x_axis])
             .custom_y_axes(vec![y_axis])
             .x_grid_spacer(move |input| steps(input.bounds, every))
+            .y_grid_spacer(move |_| marks(range))
             .allow_zoom(false)
             .allow_drag(false)
             .allow_scroll(false)
@@ -148,8 +150,8 @@ impl Curves<'_> {
         let at = |session: &Session, series: &Series| {
             words::significant((series.value)(&session.moment(self.cursor).scores), 3)
         };
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 5.0;
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = vec2(5.0, 1.0);
             for series in series {
                 let (rect, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
                 let ink = legend::line_ink(ui, series.rgb);
@@ -162,7 +164,7 @@ impl Curves<'_> {
                 ui.label(words::figure(value).strong());
                 ui.add_space(6.0);
             }
-            if self.other.is_some() {
+            if self.other.is_some() && series.len() > 1 {
                 ui.label(RichText::new("A solid, B dashed, dotted: first difference").small().weak());
             } else if !self.pushes([0.0, 1.0]).is_empty() {
                 ui.label(RichText::new("triangle: push").small().weak());
@@ -208,6 +210,15 @@ fn tick(value: f64, largest: f64) -> String {
         l if l >= 5_000.0 => format!("{:.0}k", value / 1e3),
         _ => format!("{value:.0}"),
     }
+}
+
+/// About five marks from 0 up, at round numbers.
+fn marks([_, high]: [f64; 2]) -> Vec<GridMark> {
+    let rough = high / 5.0;
+    let power = 10.0_f64.powf(rough.log10().floor());
+    let step_size = [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|step| *step >= 0.999 * rough);
+    let step_size = step_size.unwrap_or(high);
+    (0..=(high / step_size + 1e-6) as usize).map(|n| GridMark { value: n as f64 * step_size, step_size }).collect()
 }
 
 /// Marks at whole steps.

@@ -41,7 +41,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         return touched;
     };
     let Some(decision) = session.decision_after(model.cursor) else {
-        nothing(ui, session);
+        nothing(ui, session, "what the policy would do", ask);
         return touched;
     };
     let gamma = session.record.config.planner.gamma;
@@ -55,13 +55,25 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
     touched
 }
 
-fn nothing(ui: &mut Ui, session: &Session) {
-    let text = match session.activity {
-        Activity::Deciding | Activity::Running => "Weighing views and pushes",
-        _ if session.is_finished() => "The budget is used up: step back to see what was weighed",
-        _ => "Nothing weighed yet: decide, to see what the policy would do",
+/// Says why nothing is weighed at the cursor, and offers the way to `what`.
+pub fn nothing(ui: &mut Ui, session: &Session, what: &str, ask: &mut Vec<Command>) {
+    if matches!(session.activity, Activity::Deciding | Activity::Running) {
+        return empty(ui, "Weighing views and pushes");
+    }
+    let (text, title, command) = if session.is_finished() && session.steps() > 0 {
+        ("The budget is used up".to_owned(), "See the last decision", Command::GoTo(session.steps() - 1))
+    } else {
+        (format!("Nothing weighed yet: decide, to see {what}"), "Decide now", Command::Decide)
     };
-    empty(ui, text);
+    empty(ui, &text);
+    ui.vertical_centered(|ui| {
+        super::framed(ui);
+        let possible = session.is_open() || session.is_finished();
+        if ui.add_enabled(possible, Button::new(title)).on_hover_text("Shows what was weighed").clicked() {
+            ask.push(command);
+        }
+    });
+    ui.add_space(8.0);
 }
 
 /// Which step it is and whether it is done.
@@ -247,7 +259,12 @@ fn do_instead(ui: &mut Ui, session: &Session, cursor: usize, name: &str, title: 
         session if session.activity != Activity::Idle => Some("Busy: wait, or cancel"),
         _ => None,
     });
-    let button = ui.add_enabled(hindrance.is_none(), Button::new(title).small());
+    let button = ui
+        .scope(|ui| {
+            super::framed(ui);
+            ui.add_enabled(hindrance.is_none(), Button::new(title))
+        })
+        .inner;
     button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, hindrance.is_none(), name));
     let button = button.on_hover_text("Does this in place of what the policy would do");
     button.on_disabled_hover_text(hindrance.unwrap_or_default()).clicked()

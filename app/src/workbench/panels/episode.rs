@@ -39,7 +39,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     if let Some(session) = model.session() {
         scene(ui, session);
         ui.separator();
-        doing(ui, model, session, ask);
+        ui.scope(|ui| doing(ui, model, session, ask));
     }
     ui.separator();
     egui::CollapsingHeader::new("New episode").default_open(false).show(ui, |ui| form(ui, model, ask));
@@ -73,6 +73,7 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
 }
 
 fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Command>) {
+    super::framed(ui);
     // While it runs, the button that began the run pauses it.
     let runs = session.activity == Activity::Running;
     let run = if runs { MenuCommand::Pause } else { MenuCommand::Run };
@@ -103,6 +104,7 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
 }
 
 fn form(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
+    super::framed(ui);
     let form = &mut model.kept.form;
     let name = form.scene.as_ref().and_then(|path| path.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
     ui.horizontal(|ui| {
@@ -236,14 +238,10 @@ fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
     ui.separator();
     ui.weak("Open episodes");
     for session in &model.sessions {
-        ui.horizontal(|ui| {
+        // From the right, so that a long title gives way to the button beside it.
+        let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(size, egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let is_shown = model.shown == Some(session.id);
-            let busy = if session.activity == Activity::Idle { "" } else { " …" };
-            let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
-            let row = ui.add(egui::Button::selectable(is_shown, title).truncate());
-            if row.on_hover_text(session.path.display().to_string()).clicked() {
-                ask.push(Command::Show(session.id));
-            }
             if !is_shown {
                 let compare = ui.small_button("A|B");
                 compare.widget_info(|| {
@@ -254,6 +252,14 @@ fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
                     ask.push(Command::CompareWith(Some(session.id)));
                 }
             }
+            ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                let busy = if session.activity == Activity::Idle { "" } else { " …" };
+                let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
+                let row = ui.add(egui::Button::selectable(is_shown, title).truncate());
+                if row.on_hover_text(session.path.display().to_string()).clicked() {
+                    ask.push(Command::Show(session.id));
+                }
+            });
         });
     }
 }

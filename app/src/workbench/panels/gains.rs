@@ -2,7 +2,7 @@
 
 use super::facts::{self, fact};
 use super::legend::{self, Bar};
-use super::{NO_EPISODE, Touched, empty, heading, spark, weighed, words};
+use super::{NO_EPISODE, Touched, decision, empty, heading, spark, weighed, words};
 use crate::colors::Colormap;
 use crate::workbench::command::Command;
 use crate::workbench::model::{GainSource, Hovered, Model};
@@ -45,14 +45,14 @@ pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     model.panels.gains = state;
 }
 
-fn draw(state: &mut State, ui: &mut Ui, model: &Model, _ask: &mut Vec<Command>) -> Touched {
+fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
     let mut touched = Touched::default();
     let Some(session) = model.session() else {
         empty(ui, NO_EPISODE);
         return touched;
     };
     let Some(decision) = session.decision_after(model.cursor) else {
-        empty(ui, "Nothing weighed yet: decide, to see the gain of every view");
+        decision::nothing(ui, session, "the gain of every view", ask);
         return touched;
     };
     if decision.gains.iter().all(|gain| !gain.is_finite()) {
@@ -352,7 +352,7 @@ mod tests {
         let at = |y: u16, z: u16| grid.index(Voxel { x: 3, y, z });
         let nats =
             vec![(at(0, 39), 1.0), (at(39, 0), 2.0), (at(39, 5), 4.0), (grid.voxel_count(), 9.0), (at(1, 1), f32::NAN)];
-        let source = GainSource { of: (SessionId(0), 1), view: ViewId(3), nats: Arc::new(nats) };
+        let source = GainSource::new((SessionId(0), 1), ViewId(3), nats);
         let spread = Spread::of(&source, &grid);
         assert_eq!((spread.by_height[0], spread.by_height[1], spread.by_height[7]), (2.0, 4.0, 1.0));
         assert_eq!((spread.by_depth[0], spread.by_depth[7], spread.total), (1.0, 6.0, 7.0));

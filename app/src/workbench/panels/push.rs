@@ -86,12 +86,13 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         match decision.filter(|decision| !decision.candidates.is_empty()) {
             Some(decision) => here.candidates(state, ui, decision, &mut touched, ask),
             None => {
-                let text = match decision {
-                    None => "Nothing weighed yet: decide, to see what pushes would do",
-                    Some(_) => "No push was considered before this step",
-                };
                 heading(ui, "Push candidates", "");
-                ui.weak(text);
+                match decision {
+                    None => decision::nothing(ui, session, "what pushes would do", ask),
+                    Some(_) => {
+                        ui.weak("No push was considered before this step");
+                    }
+                }
             }
         }
         here.review(state, ui);

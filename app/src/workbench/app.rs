@@ -8,7 +8,7 @@ mod take_in;
 mod tests;
 
 use super::browser::Browser;
-use super::command::{Command, Level};
+use super::command::Command;
 use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};

@@ -12,6 +12,7 @@ use rerun::external::re_viewer::external::re_ui::{
 };
 use rerun::external::{eframe, egui, re_log_channel, re_log_types, re_viewer, tokio};
 use rerun::grpc_server::GrpcServerSink;
+use rerun::sink::LogSink as _;
 use rerun::{RecordingStream, RecordingStreamBuilder};
 use std::cell::RefCell;
 use std::path::Path;
@@ -183,16 +184,16 @@ fn stream_into(sender: re_log_channel::LogSender, serve: Option<u16>) -> rerun::
     let (stream, _) = RecordingStreamBuilder::new(APPLICATION).send_properties(false).memory()?;
     stream.set_log_time_enabled(false);
     stream.set_log_tick_enabled(false);
-    let shown = rerun::sink::CallbackSink::new(move |messages: &[re_log_types::LogMsg]| {
+    // The address is a constant: there is nothing in it that could not be read.
+    let served = serve.and_then(|port| GrpcServerSink::new(LOOPBACK, port, rerun::ServerOptions::default()).ok());
+    stream.set_sink(Box::new(rerun::sink::CallbackSink::new(move |messages: &[re_log_types::LogMsg]| {
         for message in messages {
+            if let Some(served) = &served {
+                served.send(message.clone());
+            }
             // The viewer is gone once the window is closed.
             let _ = sender.send(message.clone().into());
         }
-    });
-    match serve.map(|port| GrpcServerSink::new(LOOPBACK, port, rerun::ServerOptions::default())) {
-        Some(Ok(served)) => stream.set_sinks((shown, served)),
-        // The address is a constant: there is nothing in it that could not be read.
-        Some(Err(_)) | None => stream.set_sink(Box::new(shown)),
-    }
+    })));
     Ok(stream)
 }

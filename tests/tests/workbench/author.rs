@@ -1,7 +1,7 @@
 //! A scene in the making.
 
 use super::window::{SCENE, Window};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use nudge::workbench::model::LayoutKind;
 use nudge_core::scene::{Catalog, Scene};
 use nudge_tests::root;
@@ -35,6 +35,10 @@ fn a_scene_is_authored_with_undo_and_redo_saved_and_tried() {
     window.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     window.key(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z);
     assert_eq!(objects(&window), 2);
+    // The keyboard's focus on an object chooses it.
+    let board = |node: &egui_kittest::Node<'_>| node.accesskit_node().toggled().is_some();
+    window.harness.query_all_by_label_contains("cracker_box#1").find(board).expect("on the board").focus();
+    window.harness.run_steps(3);
     window.click("Rotate");
     window.click("Duplicate");
     assert_eq!(objects(&window), 3);

@@ -138,10 +138,19 @@ impl Window {
 
     /// Clicks on what has exactly this label, and waits for nothing.
     pub fn press(&mut self, label: &str) {
-        self.harness.get_by_label(label).scroll_to_me();
+        self.control(label).scroll_to_me();
         self.harness.run_steps(2);
-        click_on(&self.harness.get_by_label(label));
+        click_on(&self.control(label));
         self.harness.run_steps(2);
+    }
+
+    /// The one control of this name; text that says the same does not count.
+    fn control(&self, label: &str) -> Node<'_> {
+        let is_text = |node: &Node<'_>| node.accesskit_node().role() == egui::accesskit::Role::Label;
+        let mut controls: Vec<Node<'_>> = Vec::new();
+        controls.extend(self.harness.query_all(by().label(label)).filter(|node| !is_text(node)));
+        assert_eq!(controls.len(), 1, "controls of the name {label}");
+        controls.remove(0)
     }
 
     /// Clicks on the first of what has this in its label.
@@ -178,7 +187,7 @@ impl Window {
     }
 
     pub fn layout(&mut self, layout: LayoutKind) {
-        self.click(layout.title());
+        self.click(&format!("Layout {}", layout.title()));
         assert_eq!(self.model().kept.layout, layout);
     }
 

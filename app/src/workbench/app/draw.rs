@@ -98,7 +98,13 @@ impl App {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 for layout in LayoutKind::ALL.into_iter().rev() {
                     let entry = MenuCommand::Layout(layout);
-                    let tab = ui.selectable_label(self.model.kept.layout == layout, layout.title());
+                    let is_shown = self.model.kept.layout == layout;
+                    let tab = ui.selectable_label(is_shown, layout.title());
+                    // A menu has the same name as one of them.
+                    tab.widget_info(|| {
+                        let name = format!("Layout {}", layout.title());
+                        egui::WidgetInfo::selected(egui::WidgetType::Button, true, is_shown, name)
+                    });
                     if tab.on_hover_text(tooltip(ui.ctx(), entry)).clicked() {
                         ask.push(Command::Layout(layout));
                     }

@@ -266,14 +266,14 @@ fn generate(ui: &mut egui::Ui, author: &mut Author) {
     egui::Grid::new("author generate").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
         ui.label("Fill").on_hover_text("Share of the floor that objects shall cover, those that are there included");
         let mut percent = 100.0 * author.fill.fill;
-        let slider = egui::Slider::new(&mut percent, 5.0..=60.0).fixed_decimals(0).suffix(" %");
+        let slider = egui::Slider::new(&mut percent, 5.0..=60.0).fixed_decimals(0).suffix(" %").text("of the floor");
         let fill = named(ui.add(slider), "Fill").on_hover_text("Share of the floor, 5 to 60 %");
         if fill.changed() {
             author.fill.fill = percent / 100.0;
         }
         ui.end_row();
         ui.label("Regularity").on_hover_text("0 places freely, 1 lines objects up behind each other");
-        named(ui.add(egui::Slider::new(&mut author.fill.rho, 0.0..=1.0).fixed_decimals(1)), "Regularity")
+        named(ui.add(egui::Slider::new(&mut author.fill.rho, 0.0..=1.0).fixed_decimals(1).text("ρ")), "Regularity")
             .on_hover_text("ρ, 0 to 1");
         ui.end_row();
         ui.label("Seed").on_hover_text("Of every random choice; goes on by one after each use");

@@ -29,6 +29,11 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
             "Pushes",
             &[paths::PUSH_CANDIDATES, paths::PUSH_CHOSEN, paths::PUSH_SWEPT, paths::BELIEF_OCCUPANCY, objects],
         ),
+        Part::View(spatial_from("Robot", root, ROBOT_EYE, {
+            let robot = [paths::CAMERA_REACH, paths::ROBOT_PATH, "robot/bodies/**", paths::CAMERA_CURRENT];
+            let shelf = [paths::SHELF, paths::SHELF_EDGES, paths::PUSH_CHOSEN, paths::PUSH_SWEPT, objects];
+            robot.iter().chain(&shelf).map(|path| at(path)).collect()
+        })),
         space("Predicted", &[paths::PREDICTED_OCCUPANCY, paths::PUSH_CHOSEN, objects]),
         space("Truth", &[paths::TRUTH_OCCUPANCY]),
         space("Error", &[paths::ERROR_OCCUPANCY, objects]),
@@ -115,12 +120,21 @@ fn root_or_slash(root: &str) -> &str {
     if root.is_empty() { "/" } else { root }
 }
 
+/// From where an eye looks, and at what, metres.
+const SHELF_EYE: [[f64; 3]; 2] = [[0.0, -0.78, 0.60], [0.0, 0.16, 0.11]];
+/// Beside the robot, so that arm and shelf are both in sight.
+const ROBOT_EYE: [[f64; 3]; 2] = [[1.05, -1.10, 0.85], [0.0, -0.22, 0.18]];
+
 /// A view into the shelf from the robot's side, slightly above, with a 10 cm grid on the board.
 pub(crate) fn spatial(name: &str, root: &str, contents: Vec<String>) -> View {
+    spatial_from(name, root, SHELF_EYE, contents)
+}
+
+fn spatial_from(name: &str, root: &str, [position, target]: [[f64; 3]; 2], contents: Vec<String>) -> View {
     let eye = bp::EyeControls3D::new()
         .with_kind(bpc::Eye3DKind::Orbital)
-        .with_position([0.0, -0.78, 0.60])
-        .with_look_target([0.0, 0.16, 0.11])
+        .with_position(position.map(|v| v as f32))
+        .with_look_target(target.map(|v| v as f32))
         .with_eye_up([0.0, 0.0, 1.0]);
     let grid = bp::LineGrid3D::new()
         .with_visible(true)

@@ -20,7 +20,7 @@ pub enum Obstacle {
     },
     /// A panel of the shelf.
     Shelf {
-        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`.
+        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`, or `inside` where nothing of it may be entered.
         panel: String,
     },
     /// The table that the arm stands on.

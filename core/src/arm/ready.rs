@@ -38,7 +38,7 @@ impl Space<'_> {
 
     /// The middle of the board's front edge.
     fn middle(&self) -> Point3<f64> {
-        let board = self.panels[0];
+        let board = &self.panels[0];
         Point3::new(0.5 * (board.min[0] + board.max[0]), board.min[1], board.max[2])
     }
 }

@@ -21,6 +21,7 @@ fn manual(action: Action) -> Decision {
         gains,
         candidates: Vec::new(),
         best_push: None,
+        motion: None,
     }
 }
 

@@ -5,20 +5,18 @@
 //! backs straight out of the shelf; where that is not free all the way, the planner looks for a way from where the arm
 //! waits to where backing out ended. Contact is allowed only between the gripper and the object that is pushed.
 
-use super::{Rejection, Stage};
+use super::{Rejection, STANDOFF_M, Stage};
 use crate::arm::{
-    Arm, ArmTool, DistanceField, Follow, Hit, Joints, PlanSettings, PushMotion, Space, follow_line, level_tool, plan,
+    Arm, ArmTool, DistanceField, Follow, Hit, Joints, PlanSettings, PushMotion, Space, follow_line, YAWS_DEG, level_tool, plan,
 };
-use crate::belief::{Belief, Patch, beta_mean};
-use crate::grid::VoxelSet;
+use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, beta_mean};
+use crate::grid::{Cell, Grid, Voxel, VoxelSet};
 use crate::rng::ChaCha8Rng;
 use crate::tool::{CLEARANCE_M, Push};
 use nalgebra::Vector3;
 
 /// Occupancy probability above which the arm keeps away from a voxel.
 pub const AVOIDED: f32 = 0.7;
-/// Turns of the gripper that are tried, degrees counter-clockwise from straight into the shelf.
-pub const YAWS_DEG: [f64; 5] = [0.0, 20.0, -20.0, 40.0, -40.0];
 /// Ways from the waiting place that the planner is asked for, per push, before there is none.
 const QUERIES: usize = 2;
 /// Work of one query: a push that takes long to plan is one that another push can replace.
@@ -27,6 +25,8 @@ const QUERY: PlanSettings = PlanSettings { rounds: 120, shortcuts: 10 };
 /// A belief prepared for checking many pushes by an arm.
 pub struct ArmClearance<'a> {
     tool: &'a ArmTool,
+    grid: Grid,
+    plan: FloorPlan,
     avoided: VoxelSet,
     field: DistanceField,
     ready: Option<Joints>,
@@ -42,7 +42,25 @@ impl<'a> ArmClearance<'a> {
             }
         }
         let field = DistanceField::new(&belief.grid, &avoided);
-        Self { tool, avoided, field, ready: tool.ready }
+        let plan = FloorPlan::new(belief, AVOIDED);
+        Self { tool, grid: belief.grid, plan, avoided, field, ready: tool.ready }
+    }
+
+    /// The object that a frontier voxel belongs to; the gripper may touch what stands on its cells.
+    pub fn target(&self, frontier: Voxel) -> Patch {
+        self.plan.patch(self.grid.cell_index(Cell { x: frontier.x, y: frontier.y }), OBJECT_RADIUS_M)
+    }
+
+    /// The object that a push meets first: the first cell along the tip's track over which something is believed to
+    /// stand, as high as the tip; the cell before the start where there is none.
+    pub fn target_of(&self, push: &Push) -> Patch {
+        let step = 0.5 * self.grid.voxel_m;
+        let steps = (push.length_m / step).ceil() as usize;
+        let track = (0..=steps).map(|i| push.start_point() + push.direction() * (step * i as f32));
+        let met = track.filter_map(|point| self.grid.voxel_at(point)).find(|v| self.avoided.contains(self.grid.index(*v)));
+        let ahead = push.start_point() + push.direction() * STANDOFF_M;
+        let voxel = met.or_else(|| self.grid.voxel_at(ahead)).unwrap_or(Voxel { x: 0, y: 0, z: 0 });
+        self.target(voxel)
     }
 
     /// The arm.

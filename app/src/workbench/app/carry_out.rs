@@ -314,6 +314,7 @@ impl App {
                 gains: Vec::new(),
                 candidates: Vec::new(),
                 best_push: None,
+                motion: None,
             },
         };
         self.carry_out(Command::Act(Arc::new(decision)));

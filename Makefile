@@ -42,7 +42,7 @@ test-window: graphics python
 
 bench: setup
 	cargo build --release --locked --workspace
-	cargo bench --locked --workspace --bench gain --bench speed
+	cargo bench --locked --workspace --bench gain --bench arm --bench speed
 
 bench-window: graphics
 	cargo bench --locked --workspace $(WINDOW) --bench window

@@ -18,6 +18,8 @@ mod robot;
 pub(crate) mod shapes;
 pub(crate) mod voxels;
 
+pub(crate) use decision::mishaps;
+
 use crate::picture;
 use crate::verdicts::Judged;
 use nudge_core::arm::{ArmTool, Joints};

@@ -55,7 +55,7 @@ pub fn line(record: &StepRecord) -> String {
 
 /// What went wrong in a step, one line each.
 pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
-    let mut words: Vec<String> = record.dropped.iter().map(|name| format!("{name} fell off the board")).collect();
+    let mut words: Vec<String> = record.dropped.iter().map(|name| format!("dropped {name}")).collect();
     if let Some(push) = &record.push {
         if push.stalled {
             words.push(format!("the arm was blocked after {:.0} mm of its push", push.pushed_m * 1e3));

@@ -56,7 +56,7 @@ fn arms_that_are_no_arms() {
     let folder = folder();
     let good = shipped();
     let cases: &[(&str, &str, &str, &[&str])] = &[
-        ("mesh", r#"<box size="0.111 0.035 0.03"/>"#, r#"<mesh filename="no/such.stl"/>"#, &["line 42", "gripper_link", "no/such.stl"]),
+        ("mesh", r#"<box size="0.111 0.035 0.03"/>"#, r#"<mesh filename="no/such.stl"/>"#, &["line 44", "gripper_link", "no/such.stl"]),
         ("kind", r#"name="elbow_joint" type="revolute""#, r#"name="elbow_joint" type="hinge""#, &["elbow_joint", "is hinge"]),
         ("link", r#"<child link="wrist_1_link"/>"#, r#"<child link="wrist_7_link"/>"#, &["wrist_1_joint", "wrist_7_link"]),
         ("loop", r#"<child link="wrist_1_link"/>"#, r#"<child link="base_link"/>"#, &["shoulder_pan_joint", "loop"]),

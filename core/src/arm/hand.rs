@@ -4,22 +4,24 @@
 //! clear of table, shelf and the arm itself, and there is a way to it from where the arm waits. While it looks the arm
 //! stays out of the shelf altogether, whatever may stand in it.
 
-use super::plan::{PlanSettings, plan};
+use super::plan::is_segment_free;
 use super::pusher::ArmTool;
 use super::shortcut::shortcut;
 use super::{Joints, Motion, Space, frame_of};
 use crate::Pose;
-use crate::rng::{ChaCha8Rng, stream};
+use crate::rng::ChaCha8Rng;
 use rayon::prelude::*;
 
 /// Speed of the tool between two views, metres per second.
 pub const HAND_M_S: f64 = 0.50;
-/// Work of a query for the way to a view.
-const QUERY: PlanSettings = PlanSettings { rounds: 200, shortcuts: 20 };
 /// Attempts to shorten the way between two views.
 const SHORTCUTS: usize = 30;
 /// Branches of the inverse that are tried for a view, those with the most room first.
 const BRANCHES: usize = 3;
+/// Places that the hand already reaches from which it is tried to go on to a view, the nearest first.
+const NEIGHBOURS: usize = 4;
+/// How often the views that were not reached are tried again from what has been reached since.
+const PASSES: usize = 3;
 
 /// A place of the hand, and the way there from where the arm waits.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,25 +45,37 @@ impl HandPose {
 impl ArmTool {
     /// Per camera pose, how the hand gets there; `None` where it cannot be.
     ///
-    /// Runs in parallel; the result depends on arm, shelf and poses alone.
+    /// The views lie close together, so their configurations make a roadmap: from where the arm waits the hand goes on to
+    /// the next view wherever the straight way is free. The result depends on arm, shelf and poses alone, not on threads.
     pub fn hand_poses(&self, world_from_camera: &[Pose]) -> Vec<Option<HandPose>> {
-        let Some(ready) = self.ready else { return vec![None; world_from_camera.len()] };
+        let mut reached: Vec<Option<HandPose>> = vec![None; world_from_camera.len()];
+        let Some(ready) = self.ready else { return reached };
         let space = Space::closed(&self.arm, &self.shelf);
-        let way = |(number, pose): (usize, &Pose)| {
-            let tool = self.arm.tool_for_camera(&frame_of(pose))?;
-            let mut free: Vec<(f64, Joints)> = Vec::new();
-            for joints in self.arm.inverse(&tool, &ready) {
-                let room = space.room_m(&joints);
-                if room >= 0.0 {
-                    free.push((room, joints));
-                }
-            }
+        let places = |pose: &Pose| -> Vec<Joints> {
+            let Some(tool) = self.arm.tool_for_camera(&frame_of(pose)) else { return Vec::new() };
+            let branches = self.arm.inverse(&tool, &ready).into_iter();
+            let mut free: Vec<(f64, Joints)> = branches.map(|q| (space.room_m(&q), q)).filter(|(r, _)| *r >= 0.0).collect();
             free.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let goals: Vec<Vec<Joints>> = free.into_iter().take(BRANCHES).map(|(_, joints)| vec![joints]).collect();
-            let mut rng = stream(0, "ways of the hand", number as u64);
-            plan(&space, &ready, &goals, QUERY, &mut rng).map(|planned| HandPose { way: planned.path })
+            free.into_iter().take(BRANCHES).map(|(_, joints)| joints).collect()
         };
-        world_from_camera.par_iter().enumerate().map(way).collect()
+        let places: Vec<Vec<Joints>> = world_from_camera.par_iter().map(places).collect();
+        let travel = |view: usize| places[view].iter().map(|q| self.arm.travel_m(q, &ready)).fold(f64::INFINITY, f64::min);
+        let mut order: Vec<usize> = (0..places.len()).filter(|view| !places[*view].is_empty()).collect();
+        order.sort_by(|a, b| travel(*a).total_cmp(&travel(*b)).then(a.cmp(b)));
+        let mut roadmap = vec![HandPose::waiting(ready)];
+        for _ in 0..PASSES {
+            let before = roadmap.len();
+            order.retain(|&view| {
+                let hand = places[view].iter().find_map(|joints| go_on(&space, &roadmap, joints));
+                roadmap.extend(hand.clone());
+                reached[view] = hand;
+                reached[view].is_none()
+            });
+            if roadmap.len() == before || order.is_empty() {
+                break;
+            }
+        }
+        reached
     }
 
     /// The hand's motion from one place to another, outside the shelf: straight if that is free, else a shortened way past
@@ -72,4 +86,14 @@ impl ArmTool {
         path.dedup();
         Motion::along(&self.arm, &shortcut(&space, path, SHORTCUTS, rng), HAND_M_S)
     }
+}
+
+/// The way to a configuration from the nearest place of the roadmap from which the straight way is free.
+fn go_on(space: &Space<'_>, roadmap: &[HandPose], to: &Joints) -> Option<HandPose> {
+    let mut near: Vec<(f64, usize)> =
+        roadmap.iter().enumerate().map(|(at, place)| (space.arm.travel_m(&place.joints(), to), at)).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut near = near.into_iter().take(NEIGHBOURS).map(|(_, at)| &roadmap[at]);
+    let from = near.find(|place| is_segment_free(space, &place.joints(), to))?;
+    Some(HandPose { way: from.way.iter().chain([to]).copied().collect() })
 }

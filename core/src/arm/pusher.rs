@@ -61,7 +61,7 @@ impl ArmTool {
         Self::new(Arm::standard(&RobotPlacement::default()), shelf)
     }
 
-    /// The arm among voxels that are believed to be there.
+    /// The arm before its shelf, of which nothing else is known.
     pub fn space(&self) -> Space<'_> {
         Space::empty(&self.arm, &self.shelf)
     }

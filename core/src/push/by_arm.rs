@@ -17,8 +17,10 @@ use nalgebra::Vector3;
 
 /// Occupancy probability above which the arm keeps away from a voxel.
 pub const AVOIDED: f32 = 0.7;
-/// Ways from the waiting place that the planner is asked for, per push, before there is none.
+/// Ways from the waiting place that the planner searches for, per push, where none is straight.
 const QUERIES: usize = 2;
+/// A query that only tries straight ways.
+const STRAIGHT: PlanSettings = PlanSettings { rounds: 0, shortcuts: 0 };
 /// Work of one query: a push that takes long to plan is one that another push can replace.
 const QUERY: PlanSettings = PlanSettings { rounds: 120, shortcuts: 10 };
 
@@ -99,21 +101,18 @@ impl<'a> ArmClearance<'a> {
                 }
                 let out = Vector3::new(0.0, -(push.start[1] + CLEARANCE_M).max(0.0) as f64, 0.0);
                 let (back, hit) = self.follow(&touching, &start, &out);
-                let blocker = hit.map(|hit| blocked(Stage::WayIn, hit));
                 let complete = back.complete;
+                let blocker = (!complete).then(|| hit.map_or(Rejection::NoWay, |hit| blocked(Stage::WayIn, hit)));
                 goals.push(Attempt { push: line.path, chain: back.path, blocker });
-                // A way that leads straight out is as good as it gets; the planner need not be asked for others.
-                if complete && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], rng) {
+                // A way that leads straight out and on is as good as it gets; the planner need not search for others.
+                if complete && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], STRAIGHT, rng) {
                     return Ok(motion);
-                }
-                if complete {
-                    goals.pop();
-                    reason.deeper(3, Rejection::NoWay);
                 }
             }
         }
+        goals.sort_by_key(|attempt| attempt.blocker.is_some());
         for attempts in goals.chunks(1).take(QUERIES) {
-            if let Some(motion) = self.finish(&space, &ready, attempts, rng) {
+            if let Some(motion) = self.finish(&space, &ready, attempts, QUERY, rng) {
                 return Ok(motion);
             }
             reason.deeper(3, attempts[0].blocker.clone().unwrap_or(Rejection::NoWay));
@@ -137,10 +136,11 @@ impl<'a> ArmClearance<'a> {
         space: &Space<'_>,
         ready: &Joints,
         attempts: &[Attempt],
+        settings: PlanSettings,
         rng: &mut ChaCha8Rng,
     ) -> Option<PushMotion> {
         let chains: Vec<Vec<Joints>> = attempts.iter().map(|attempt| attempt.chain.clone()).collect();
-        let planned = plan(space, ready, &chains, QUERY, rng)?;
+        let planned = plan(space, ready, &chains, settings, rng)?;
         let start = planned.path.last()?;
         let attempt = attempts.iter().find(|attempt| attempt.push.first() == Some(start))?;
         Some(PushMotion::new(&self.tool.arm, &planned.path, &attempt.push))

@@ -423,7 +423,7 @@ fn setting(episode: &Episode) -> Setting<'_> {
         views: episode.views(),
         budget: record.config.budget,
         gamma: record.config.planner.gamma,
-        arm: episode.arm(),
+        arm: Some(episode.arm()),
         unreachable: episode.unreachable_views(),
     }
 }

@@ -15,6 +15,7 @@ use parry3d::shape::{Ball, Voxels};
 use rand::Rng;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 fn main() {
@@ -178,7 +179,7 @@ fn pushes(scenes: &[Crowded]) {
             let image = render(&scene.shelf, &bodies, view, &views.intrinsics);
             belief = Classical.observe(&belief, &project(&image, view, &views.intrinsics, &scene.shelf));
         }
-        let pusher = Pusher::Arm(Box::new(ArmTool::standard(scene.shelf)));
+        let pusher = Pusher::Arm(Arc::new(ArmTool::standard(scene.shelf)));
         let (wall, processor) = (Instant::now(), process_s());
         let candidates = sample_by(&belief, &pusher, 80, &mut stream(1, "pushes", 0));
         let (wall, processor) = (wall.elapsed().as_secs_f64(), process_s() - processor);

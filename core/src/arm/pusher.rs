@@ -5,6 +5,7 @@ use crate::grid::{Grid, VoxelSet};
 use crate::scene::{RobotPlacement, Shelf};
 use crate::tool::{Push, Tool};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Speed of the tip on the way to a push, metres per second.
 pub const WAY_IN_M_S: f64 = 0.25;
@@ -19,7 +20,7 @@ pub enum Pusher {
     /// A gripper with two links that comes in straight and needs no arm.
     Free(Tool),
     /// An arm before the shelf.
-    Arm(Box<ArmTool>),
+    Arm(Arc<ArmTool>),
 }
 
 impl Default for Pusher {

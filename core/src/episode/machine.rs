@@ -24,7 +24,7 @@ pub struct Episode {
     update: Arc<dyn BeliefUpdate>,
     views: Arc<ViewArray>,
     tool: Arc<Tool>,
-    pusher: Arc<Pusher>,
+    arm: Arc<ArmTool>,
     /// How the hand gets to each view; `None` where it cannot be.
     hands: Arc<Vec<Option<HandPose>>>,
     /// Where the hand is, if the arm can wait anywhere.
@@ -60,7 +60,7 @@ impl Episode {
             return Err(Error::Usage("the budget must be at least one action".to_owned()));
         }
         let views = Arc::new(ViewArray::named(&config.views)?);
-        let arm = ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf);
+        let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         let hands = Arc::new(views.hand_poses(&arm));
         let unreachable = Arc::new(views.unreachable(&hands));
         let mut world = World::new(scene.shelf, scene.bodies(&catalog)?);
@@ -83,7 +83,7 @@ impl Episode {
             views,
             tool: Arc::new(Tool::standard()),
             hand: arm.ready.map(HandPose::waiting),
-            pusher: Arc::new(Pusher::Arm(Box::new(arm))),
+            arm,
             hands,
             unreachable,
             world,
@@ -107,7 +107,7 @@ impl Episode {
             belief: &self.belief,
             update: &*self.update,
             views: &self.views,
-            pusher: &self.pusher,
+            pusher: &Pusher::Arm(self.arm.clone()),
             unreachable: &self.unreachable,
             history: &self.history,
             budget: self.record.config.budget,
@@ -173,10 +173,8 @@ impl Episode {
             return Err(Error::Usage(format!("a push must be a finite motion, not {numbers:?}")));
         }
         let started = Instant::now();
-        let Pusher::Arm(arm) = &*self.pusher.clone() else {
-            return Err(Error::Usage("this episode has no arm to push with".to_owned()));
-        };
-        let motion = self.motion_for(arm, &mut decision, &push)?;
+        let arm = self.arm.clone();
+        let motion = self.motion_for(&arm, &mut decision, &push)?;
         let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
         let outcome: PushOutcome = self.world.execute_motion(&arm.arm, &motion);
         seconds.act = started.elapsed().as_secs_f64();
@@ -228,9 +226,9 @@ impl Episode {
 
     /// Moves the hand, if there is an arm that can be there.
     fn carry(&mut self, to: Option<HandPose>) -> Option<Motion> {
-        let (Pusher::Arm(arm), Some(from), Some(to)) = (&*self.pusher, &self.hand, to) else { return None };
+        let (from, to) = (self.hand.as_ref()?, to?);
         let mut rng = stream(self.record.config.seed, "ways of the hand", self.record.steps.len() as u64);
-        let motion = arm.carry(from, &to, &mut rng);
+        let motion = self.arm.carry(from, &to, &mut rng);
         self.hand = Some(to);
         Some(motion)
     }
@@ -353,8 +351,8 @@ impl Episode {
     }
 
     /// The arm before the shelf.
-    pub fn arm(&self) -> Option<&ArmTool> {
-        self.pusher.arm()
+    pub fn arm(&self) -> &Arc<ArmTool> {
+        &self.arm
     }
 
     /// Per view, how the hand gets there; `None` where it cannot be.
@@ -370,10 +368,9 @@ impl Episode {
 
     /// Why this episode will never push, if that is known from the start.
     pub fn why_no_push(&self) -> Option<String> {
-        let arm = self.pusher.arm()?;
-        arm.ready.is_none().then(|| {
-            format!("{} reaches no place before the shelf from where it stands, so nothing is pushed", arm.arm.name)
-        })
+        let name = &self.arm.arm.name;
+        let words = || format!("{name} reaches no place before the shelf from where it stands, so nothing is pushed");
+        self.arm.ready.is_none().then(words)
     }
 
     /// The shape that stands for gripper and last links where no motion of the arm is known.

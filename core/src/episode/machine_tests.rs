@@ -136,7 +136,7 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
 
 /// The arm's motion for a push with the gripper turned away from where it pulls to: in from the left, around a can.
 fn hook(episode: &Episode, push: &Push) -> PushMotion {
-    let tool = episode.arm().expect("an arm");
+    let tool = episode.arm();
     let (arm, ready) = (&tool.arm, tool.ready.expect("a place to wait"));
     let tip = push.start_point().map(f64::from);
     let pose = crate::arm::level_tool(&tip, -0.9);

@@ -113,7 +113,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if let (Some(out), Some(array), Some(views)) = (&args.out, arrays.first(), views.first()) {
         let joints = tool.ready.unwrap_or_else(|| nudge_core::arm::Joints::zero(tool.arm.joints.len()));
         let placed = picture::Placed { arm: &tool, joints, reach: &reach, intrinsics: &array.intrinsics, views };
-        picture::save(&picture::of_robot(&placed, [1280, 960]), out)?;
+        picture::save(&picture::of_robot(&placed, [1120, 840]), out)?;
     }
     print(&if args.json { to_json(&report)? } else { table(&report) })?;
     if tool.ready.is_none() {

@@ -1,7 +1,7 @@
 //! Where the hand can be to look, and how it gets from one place to the next.
 //!
 //! A view counts only if the camera in hand can be there: some configuration within the joints' limits has it there,
-//! clear of table, shelf and the arm itself, and there is a way to it from where the arm waits. While it looks the arm
+//! clear of table, shelf and the arm itself (upright, or upside down), and there is a way to it from where the arm waits. While it looks the arm
 //! stays out of the shelf altogether, whatever may stand in it.
 
 use super::plan::is_segment_free;
@@ -10,14 +10,13 @@ use super::shortcut::shortcut;
 use super::{Joints, Motion, Space, frame_of};
 use crate::Pose;
 use crate::rng::ChaCha8Rng;
+use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
 /// Speed of the tool between two views, metres per second.
 pub const HAND_M_S: f64 = 0.50;
 /// Attempts to shorten the way between two views.
 const SHORTCUTS: usize = 30;
-/// Branches of the inverse that are tried for a view, those with the most room first.
-const BRANCHES: usize = 3;
 /// Places that the hand already reaches from which it is tried to go on to a view, the nearest first.
 const NEIGHBOURS: usize = 4;
 /// How often the views that were not reached are tried again from what has been reached since.
@@ -51,12 +50,13 @@ impl ArmTool {
         let mut reached: Vec<Option<HandPose>> = vec![None; world_from_camera.len()];
         let Some(ready) = self.ready else { return reached };
         let space = Space::closed(&self.arm, &self.shelf);
+        // Upright first; a picture that was taken upside down is turned.
+        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
         let places = |pose: &Pose| -> Vec<Joints> {
-            let Some(tool) = self.arm.tool_for_camera(&frame_of(pose)) else { return Vec::new() };
-            let branches = self.arm.inverse(&tool, &ready).into_iter();
-            let mut free: Vec<(f64, Joints)> = branches.map(|q| (space.room_m(&q), q)).filter(|(r, _)| *r >= 0.0).collect();
-            free.sort_by(|a, b| b.0.total_cmp(&a.0));
-            free.into_iter().take(BRANCHES).map(|(_, joints)| joints).collect()
+            let camera = frame_of(pose);
+            let tools = [camera, camera * half_turn].into_iter().filter_map(|camera| self.arm.tool_for_camera(&camera));
+            let branches = tools.flat_map(|tool| self.arm.inverse(&tool, &ready));
+            branches.filter(|joints| space.room_m(joints) >= 0.0).collect()
         };
         let places: Vec<Vec<Joints>> = world_from_camera.par_iter().map(places).collect();
         let travel = |view: usize| places[view].iter().map(|q| self.arm.travel_m(q, &ready)).fold(f64::INFINITY, f64::min);

@@ -43,7 +43,7 @@ test-window: graphics python
 
 bench: setup
 	cargo build --release --locked --workspace
-	cargo bench --locked --workspace --bench gain --bench speed
+	cargo bench --locked --workspace --bench gain --bench arm --bench speed
 
 bench-window: graphics
 	cargo build --release --locked --workspace $(WINDOW)

@@ -10,6 +10,7 @@ mod mesh;
 #[cfg(feature = "workbench")]
 mod open;
 mod replay;
+mod robot;
 mod run;
 mod scene;
 #[cfg(feature = "workbench")]
@@ -38,6 +39,8 @@ enum Command {
     Replay(replay::Args),
     /// Make, check, generate and draw scenes
     Scene(scene::Args),
+    /// Check an arm's URDF file: what it reaches, and which views
+    Robot(robot::Args),
     /// Show what Nudge makes of a mesh
     Mesh(mesh::Args),
     /// Print the poses of a view array
@@ -60,6 +63,7 @@ pub fn main() -> ExitCode {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Scene(args)) => scene::run(&args),
+        Some(Command::Robot(args)) => robot::run(&args),
         Some(Command::Mesh(args)) => mesh::run(&args),
         Some(Command::Views(args)) => views::run(&args),
     };

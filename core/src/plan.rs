@@ -13,10 +13,11 @@ pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, QUIET_STEPS, SATURATION, look_or_push, push_guard, saturated};
 pub use weigh::{COARSE_VIEWS, disturbance};
 
+use crate::arm::{PushMotion, Pusher};
 use crate::belief::{Belief, BeliefUpdate, CERTAIN, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::push::Rejection;
-use crate::tool::{Push, Tool};
+use crate::tool::Push;
 use serde::{Deserialize, Serialize};
 
 /// Weight of the disturbance term.
@@ -79,6 +80,9 @@ pub struct CandidateRecord {
     pub view: Option<ViewId>,
     /// `min(0, H_s(belief) - H_s(predicted))`, nats.
     pub reg: Option<f32>,
+    /// How long the arm's motion takes, in, along and back, seconds; `None` if rejected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion_s: Option<f64>,
 }
 
 /// Everything that was weighed at one step and what was chosen.
@@ -104,6 +108,9 @@ pub struct Decision {
     /// Position of the best push in `candidates`.
     #[serde(default)]
     pub best_push: Option<usize>,
+    /// The arm's motion for the push that is the action, else for the best one; `None` where none was weighed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<PushMotion>,
 }
 
 /// What the episode remembers for the planner.
@@ -167,7 +174,9 @@ pub struct Situation<'a> {
     /// The candidate views.
     pub views: &'a ViewArray,
     /// What pushes.
-    pub tool: &'a Tool,
+    pub pusher: &'a Pusher,
+    /// Views that are not offered: the hand cannot be there.
+    pub unreachable: &'a [ViewId],
     /// What happened so far.
     pub history: &'a History,
     /// Number of actions in all.
@@ -176,6 +185,13 @@ pub struct Situation<'a> {
     pub seed: u64,
     /// The belief after really looking from a view: for the clairvoyant oracle only.
     pub really_look: &'a (dyn Fn(ViewId) -> Belief + Sync),
+}
+
+impl Situation<'_> {
+    /// The views that are offered, by id.
+    pub fn offered(&self) -> Vec<ViewId> {
+        self.views.views.iter().map(|view| view.id).filter(|view| !self.unreachable.contains(view)).collect()
+    }
 }
 
 /// Numbers of the planner that a user may change.

@@ -3,6 +3,7 @@
 use super::{print, to_json, warn};
 use crate::picture::{self, View};
 use indicatif::{ProgressBar, ProgressStyle};
+use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::files::write_atomically;
 use nudge_core::scene::{Catalog, ClassId, GenerateConfig, Scene, Shelf, generate};
@@ -167,6 +168,10 @@ fn template(name: &str, catalog: &Catalog) -> String {
          # column_closure = true          # above free all is free, below occupied all is occupied\n\n\
          # [meshes]                       # shapes of one's own: class = mesh file, relative to this file\n\
          # chips_can = \"chips_can.obj\"\n\n\
+         # [robot]                        # the arm before the shelf; these are the defaults\n\
+         # base = [0.0, -0.70, -0.015]    # origin of its base, as high as the table that it stands on\n\
+         # yaw_deg = 0.0                  # turn of the base\n\
+         # urdf = \"my_arm.urdf\"          # an arm of one's own, relative to this file, for the UR5 that Nudge has\n\n\
          # Classes, with their size along x, y, z in metres:\n"
     );
     for class in &catalog.classes {
@@ -249,7 +254,11 @@ fn check(args: &CheckArgs) -> anyhow::Result<()> {
 }
 
 fn check_file(file: &Path, catalog: &Catalog, views: &ViewArray) -> nudge_core::Result<(Facts, Vec<String>)> {
-    let (scene, warnings) = Scene::load(file, catalog)?;
+    let (scene, mut warnings) = Scene::load(file, catalog)?;
+    let arm = ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf);
+    if arm.ready.is_none() {
+        warnings.push(format!("{} reaches no place before the shelf from where it stands", arm.arm.name));
+    }
     let bodies = scene.bodies(catalog)?;
     let hidden = hidden_objects(&scene.shelf, &bodies, views);
     let name = |id: &nudge_core::scene::ObjectId| format!("{}#{}", scene.objects[usize::from(id.0)].class, id.0);

@@ -10,6 +10,7 @@ use super::session::{Moment, SessionId, Setup};
 use super::{space_layout, viewer};
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture;
+use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::{colored, surface};
 use nudge_core::belief::{Belief, bernoulli_entropy, beta_mean};
@@ -99,6 +100,8 @@ pub struct Space {
     pub layout: LayoutKind,
     /// Width over height of the place for the three-dimensional views.
     pub aspect: f32,
+    /// Whether the window is light.
+    pub light: bool,
     /// The episode that is shown.
     pub side: Option<Side>,
     /// The second one of a comparison.
@@ -145,8 +148,8 @@ impl Drawn {
 pub struct Painter {
     stream: RecordingStream,
     drawn: Drawn,
-    /// The views that are there, and how far from the shelf their eyes began.
-    layout: Option<(LayoutKind, f32)>,
+    /// The views that are there, how far from the shelf their eyes began, and their ground.
+    layout: Option<(LayoutKind, f32, Ground)>,
     /// What every entity was last drawn from, as words.
     keys: BTreeMap<&'static str, String>,
     /// The last beliefs in full precision.
@@ -161,8 +164,9 @@ impl Painter {
 
     /// Logs what differs from the last call.
     pub fn paint(&mut self, space: &Space) {
-        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect)
-            && self.layout.replace((views, distance)) != Some((views, distance))
+        let ground = if space.light { Ground::Light } else { Ground::Dark };
+        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect, ground)
+            && self.layout.replace((views, distance, ground)) != Some((views, distance, ground))
             && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
         {
             eprintln!("warning: layout: {error}");

@@ -3,7 +3,7 @@
 use super::model::LayoutKind;
 use super::space::at;
 use crate::record::blueprint::{Layout, Part};
-use crate::record::layout::spatial;
+use crate::record::layout::{Eye, Ground, spatial};
 
 /// Width over height from which on a view shows the whole shelf with the eye where it is by default.
 const WHOLE_SHELF: f32 = 1.05;
@@ -18,14 +18,20 @@ fn distance(aspect: f32) -> f32 {
 
 /// The views of a layout with the first layout that has the same ones, and the distance of their eyes; `None` where it
 /// has none. `aspect` is width over height of the place for all of them together.
-pub fn of(layout: LayoutKind, aspect: f32) -> Option<(LayoutKind, f32, Layout)> {
+pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground) -> Option<(LayoutKind, f32, Layout)> {
     let distance = distance(match layout {
         LayoutKind::Compare => aspect / 3.0,
         _ => aspect,
     });
     let always = [at::SHELF, at::EDGES];
     let view = |name: &str, shown: &[&str]| {
-        Part::View(spatial(name, "", distance, always.iter().chain(shown).map(|path| format!("/{path}")).collect()))
+        Part::View(spatial(
+            name,
+            "",
+            Eye::SHELF.farther(distance),
+            ground,
+            always.iter().chain(shown).map(|path| format!("/{path}")).collect(),
+        ))
     };
     let pointer = [at::HOVERED, at::PICKED];
     let root = match layout {

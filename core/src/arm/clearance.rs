@@ -20,7 +20,7 @@ pub enum Obstacle {
     },
     /// A panel of the shelf.
     Shelf {
-        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`.
+        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`, or `inside` where nothing of it may be entered.
         panel: String,
     },
     /// The table that the arm stands on.
@@ -139,7 +139,8 @@ impl Space<'_> {
         }
         for &[a, b] in &self.arm.self_pairs {
             // Both sides may move, so each may use half of the gap.
-            let ([body_a, part_a], [body_b, part_b]) = (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
+            let ([body_a, part_a], [body_b, part_b]) =
+                (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
             let (first, second): (&Part, &Part) = (&self.arm.bodies[body_a][part_a], &self.arm.bodies[body_b][part_b]);
             let whole = Placed::of(&second.around, &poses[body_b]);
             if Placed::of(&first.around, &poses[body_a]).gap_m(&whole) >= 2.0 * room {

@@ -67,7 +67,9 @@ impl Motion {
     /// The same way back, just as fast.
     pub fn reversed(&self) -> Self {
         let end = self.duration_s();
-        Self { stops: self.stops.iter().rev().map(|stop| Stop { at_s: end - stop.at_s, joints: stop.joints }).collect() }
+        Self {
+            stops: self.stops.iter().rev().map(|stop| Stop { at_s: end - stop.at_s, joints: stop.joints }).collect(),
+        }
     }
 
     /// This motion and then another that begins where this one ends.

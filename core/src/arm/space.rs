@@ -13,7 +13,7 @@ pub const SHELF_MARGIN_M: f64 = 0.005;
 pub(super) const PANEL_M: f64 = 0.02;
 
 /// The shelf's panels in the order of [`super::Obstacle::Shelf`]'s names.
-pub(super) const PANELS: [&str; 5] = ["board", "back", "left wall", "right wall", "ceiling"];
+pub(super) const PANELS: [&str; 6] = ["board", "back", "left wall", "right wall", "ceiling", "inside"];
 
 /// A panel, `f64`.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +40,7 @@ impl Slab {
 pub struct Space<'a> {
     /// The arm.
     pub arm: &'a Arm,
-    pub(super) panels: [Slab; 5],
+    pub(super) panels: Vec<Slab>,
     /// Height of the table that the arm stands on, metres.
     pub(super) table_z: f64,
     pub(super) map: Option<MapObstacles<'a>>,
@@ -63,7 +63,7 @@ impl<'a> Space<'a> {
         let slab = |min: [f64; 3], max: [f64; 3]| Slab { min, max };
         Self {
             arm,
-            panels: [
+            panels: vec![
                 slab([min.x - t, min.y, min.z - t], [max.x + t, max.y + t, min.z]),
                 slab([min.x - t, max.y, min.z], [max.x + t, max.y + t, max.z]),
                 slab([min.x - t, min.y, min.z], [min.x, max.y, max.z]),
@@ -73,6 +73,13 @@ impl<'a> Space<'a> {
             table_z: arm.world_from_base.translation.z,
             map: None,
         }
+    }
+
+    /// The same with the whole inside of the shelf forbidden.
+    pub fn closed(arm: &'a Arm, shelf: &Shelf) -> Self {
+        let mut space = Self::empty(arm, shelf);
+        space.panels.push(Slab { min: shelf.min().map(f64::from).into(), max: shelf.max().map(f64::from).into() });
+        space
     }
 
     /// The same with voxels that must not be touched, and the distances to them.
@@ -91,7 +98,9 @@ impl<'a> Space<'a> {
     }
 
     /// The panels as boxes.
-    pub fn panels(&self) -> [Bounds; 5] {
-        self.panels.map(|slab| Bounds { min: slab.min.map(|v| v as f32).into(), max: slab.max.map(|v| v as f32).into() })
+    pub fn panels(&self) -> Vec<Bounds> {
+        let bounds =
+            |slab: &Slab| Bounds { min: slab.min.map(|v| v as f32).into(), max: slab.max.map(|v| v as f32).into() };
+        self.panels.iter().map(bounds).collect()
     }
 }

@@ -5,28 +5,31 @@
 //! backs straight out of the shelf; where that is not free all the way, the planner looks for a way from where the arm
 //! waits to where backing out ended. Contact is allowed only between the gripper and the object that is pushed.
 
-use super::{Rejection, Stage};
+use super::{Rejection, STANDOFF_M, Stage};
 use crate::arm::{
-    Arm, ArmTool, DistanceField, Follow, Hit, Joints, PlanSettings, PushMotion, Space, follow_line, level_tool, plan,
+    Arm, ArmTool, DistanceField, Follow, Hit, Joints, PlanSettings, PushMotion, Space, YAWS_DEG, follow_line,
+    level_tool, plan,
 };
-use crate::belief::{Belief, Patch, beta_mean};
-use crate::grid::VoxelSet;
+use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, beta_mean};
+use crate::grid::{Cell, Grid, Voxel, VoxelSet};
 use crate::rng::ChaCha8Rng;
 use crate::tool::{CLEARANCE_M, Push};
 use nalgebra::Vector3;
 
 /// Occupancy probability above which the arm keeps away from a voxel.
 pub const AVOIDED: f32 = 0.7;
-/// Turns of the gripper that are tried, degrees counter-clockwise from straight into the shelf.
-pub const YAWS_DEG: [f64; 5] = [0.0, 20.0, -20.0, 40.0, -40.0];
-/// Ways from the waiting place that the planner is asked for, per push, before there is none.
+/// Ways from the waiting place that the planner searches for, per push, where none is straight.
 const QUERIES: usize = 2;
+/// A query that only tries straight ways.
+const STRAIGHT: PlanSettings = PlanSettings { rounds: 0, shortcuts: 0 };
 /// Work of one query: a push that takes long to plan is one that another push can replace.
 const QUERY: PlanSettings = PlanSettings { rounds: 120, shortcuts: 10 };
 
 /// A belief prepared for checking many pushes by an arm.
 pub struct ArmClearance<'a> {
     tool: &'a ArmTool,
+    grid: Grid,
+    plan: FloorPlan,
     avoided: VoxelSet,
     field: DistanceField,
     ready: Option<Joints>,
@@ -42,7 +45,26 @@ impl<'a> ArmClearance<'a> {
             }
         }
         let field = DistanceField::new(&belief.grid, &avoided);
-        Self { tool, avoided, field, ready: tool.ready }
+        let plan = FloorPlan::new(belief, AVOIDED);
+        Self { tool, grid: belief.grid, plan, avoided, field, ready: tool.ready }
+    }
+
+    /// The object that a frontier voxel belongs to; the gripper may touch what stands on its cells.
+    pub fn target(&self, frontier: Voxel) -> Patch {
+        self.plan.patch(self.grid.cell_index(Cell { x: frontier.x, y: frontier.y }), OBJECT_RADIUS_M)
+    }
+
+    /// The object that a push meets first: the first cell along the tip's track over which something is believed to
+    /// stand, as high as the tip; the cell before the start where there is none.
+    pub fn target_of(&self, push: &Push) -> Patch {
+        let step = 0.5 * self.grid.voxel_m;
+        let steps = (push.length_m / step).ceil() as usize;
+        let track = (0..=steps).map(|i| push.start_point() + push.direction() * (step * i as f32));
+        let met =
+            track.filter_map(|point| self.grid.voxel_at(point)).find(|v| self.avoided.contains(self.grid.index(*v)));
+        let ahead = push.start_point() + push.direction() * STANDOFF_M;
+        let voxel = met.or_else(|| self.grid.voxel_at(ahead)).unwrap_or(Voxel { x: 0, y: 0, z: 0 });
+        self.target(voxel)
     }
 
     /// The arm.
@@ -81,21 +103,19 @@ impl<'a> ArmClearance<'a> {
                 }
                 let out = Vector3::new(0.0, -(push.start[1] + CLEARANCE_M).max(0.0) as f64, 0.0);
                 let (back, hit) = self.follow(&touching, &start, &out);
-                let blocker = hit.map(|hit| blocked(Stage::WayIn, hit));
                 let complete = back.complete;
+                let blocker = (!complete).then(|| hit.map_or(Rejection::NoWay, |hit| blocked(Stage::WayIn, hit)));
                 goals.push(Attempt { push: line.path, chain: back.path, blocker });
-                // A way that leads straight out is as good as it gets; the planner need not be asked for others.
-                if complete && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], rng) {
+                // A way that leads straight out and on is as good as it gets; the planner need not search for others.
+                if complete && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], STRAIGHT, rng)
+                {
                     return Ok(motion);
-                }
-                if complete {
-                    goals.pop();
-                    reason.deeper(3, Rejection::NoWay);
                 }
             }
         }
+        goals.sort_by_key(|attempt| attempt.blocker.is_some());
         for attempts in goals.chunks(1).take(QUERIES) {
-            if let Some(motion) = self.finish(&space, &ready, attempts, rng) {
+            if let Some(motion) = self.finish(&space, &ready, attempts, QUERY, rng) {
                 return Ok(motion);
             }
             reason.deeper(3, attempts[0].blocker.clone().unwrap_or(Rejection::NoWay));
@@ -119,10 +139,11 @@ impl<'a> ArmClearance<'a> {
         space: &Space<'_>,
         ready: &Joints,
         attempts: &[Attempt],
+        settings: PlanSettings,
         rng: &mut ChaCha8Rng,
     ) -> Option<PushMotion> {
         let chains: Vec<Vec<Joints>> = attempts.iter().map(|attempt| attempt.chain.clone()).collect();
-        let planned = plan(space, ready, &chains, QUERY, rng)?;
+        let planned = plan(space, ready, &chains, settings, rng)?;
         let start = planned.path.last()?;
         let attempt = attempts.iter().find(|attempt| attempt.push.first() == Some(start))?;
         Some(PushMotion::new(&self.tool.arm, &planned.path, &attempt.push))

@@ -333,6 +333,7 @@ impl App {
                 gains: Vec::new(),
                 candidates: Vec::new(),
                 best_push: None,
+                motion: None,
             },
         };
         self.carry_out(Command::Act(Arc::new(decision)));

@@ -278,8 +278,9 @@ impl App {
         };
         let kept = &model.kept;
         let key = format!(
-            "{:?} {aspect:.2} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            "{:?} {aspect:.2} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             kept.layout,
+            kept.light,
             model.session().map(|session| (session.id, session.steps(), session.pending.is_some())),
             model.other_session().map(|session| (session.id, session.steps())),
             model.cursor,
@@ -298,6 +299,7 @@ impl App {
         let space = Space {
             layout: kept.layout,
             aspect,
+            light: kept.light,
             side: model.session().map(side),
             other: model.other_session().filter(|_| kept.layout == LayoutKind::Compare).map(side),
             display: kept.display.clone(),

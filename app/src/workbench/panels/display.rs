@@ -48,6 +48,15 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
         ui.separator();
         key(ui, display.colour_by);
+        // The views beside it that show a difference have a scale of their own.
+        if matches!(layout, LayoutKind::Compare | LayoutKind::Push) {
+            let (name, unit) = if layout == LayoutKind::Push {
+                ("predicted minus now", "difference")
+            } else {
+                ("A minus B", "A − B")
+            };
+            scale(ui, Colormap::Diverging, name, ["−1", "+1"], unit);
+        }
         ui.weak(format!("{drawn} voxels")).on_hover_text("Drawn; only the surface of what is inside the band shows");
     });
 }

@@ -92,7 +92,7 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
     let doing = match session.activity {
         Activity::Idle if session.is_finished() => "the budget is used up",
         Activity::Idle if session.read_only.is_some() => "to look at only",
-        Activity::Idle if session.pending.is_some() => "decided; do it, or something else",
+        Activity::Idle if session.pending.is_some() => "decided",
         Activity::Idle => "ready",
         Activity::Opening { .. } => "opening",
         Activity::Deciding => "deciding…",

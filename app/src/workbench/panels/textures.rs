@@ -36,7 +36,7 @@ impl<K: PartialEq> Textures<K> {
             self.kept.push(found);
         } else {
             if self.kept.len() == KEPT {
-                self.kept.remove(0);
+                drop(self.kept.remove(0));
             }
             self.kept.push((key, ctx.load_texture("panel", paint(), options)));
         }

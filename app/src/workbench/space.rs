@@ -122,9 +122,11 @@ pub struct Space {
     pub gain: Option<GainSource>,
 }
 
+type VoxelsOf = BTreeMap<&'static str, Arc<Vec<usize>>>;
+
 /// Which voxel every drawn instance of an entity is.
 #[derive(Clone, Default)]
-pub struct Drawn(Arc<Mutex<BTreeMap<&'static str, Arc<Vec<usize>>>>>);
+pub struct Drawn(Arc<Mutex<VoxelsOf>>);
 
 impl Drawn {
     /// The voxel of an instance.

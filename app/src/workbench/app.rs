@@ -185,6 +185,9 @@ pub struct Opening {
     pub activity: Activity,
 }
 
+/// Both ends of a channel; the first is cloned for every thread that tells something.
+type Channel<T> = (Sender<T>, Receiver<T>);
+
 /// Two episodes that are run side by side, once both are open.
 struct Pair {
     ids: [SessionId; 2],
@@ -198,9 +201,9 @@ pub struct App {
     catalog: Arc<Catalog>,
     workers: BTreeMap<SessionId, Worker>,
     openings: BTreeMap<SessionId, Opening>,
-    events: (Sender<(SessionId, Event)>, Receiver<(SessionId, Event)>),
+    events: Channel<(SessionId, Event)>,
     /// Paths that were chosen in the system's dialogs.
-    chosen: (Sender<(ChosenFor, PathBuf)>, Receiver<(ChosenFor, PathBuf)>),
+    chosen: Channel<(ChosenFor, PathBuf)>,
     background: Background,
     tasks: Tasks,
     pairs: Vec<Pair>,

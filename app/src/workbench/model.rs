@@ -191,7 +191,7 @@ pub struct GainSource {
     pub view: ViewId,
     /// Nats by voxel.
     pub nats: Arc<Vec<(usize, f32)>>,
-    /// The top of the colour scale, nats; see [`crate::record::voxels::gain_top`].
+    /// The top of the colour scale, nats; see `gain_top` in the recording's voxels.
     pub top: f32,
 }
 

@@ -25,23 +25,41 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Entities of the window's recording.
 pub mod at {
+    /// The panels of the shelf.
     pub const SHELF: &str = "shelf/panels";
+    /// Its edges.
     pub const EDGES: &str = "shelf/edges";
+    /// The true objects as glass.
     pub const OBJECTS: &str = "objects";
+    /// The belief of the shown episode.
     pub const BELIEF: &str = "belief";
+    /// The candidate views.
     pub const VIEWS: &str = "camera/views";
+    /// The view that was looked from last.
     pub const CURRENT: &str = "camera/current";
+    /// The push candidates.
     pub const CANDIDATES: &str = "push/candidates";
+    /// The push that was done or is looked at.
     pub const CHOSEN: &str = "push/chosen";
+    /// What it sweeps.
     pub const SWEPT: &str = "push/swept";
+    /// The belief that it is predicted to leave.
     pub const PREDICTED: &str = "push/predicted";
+    /// How that differs from now.
     pub const DIFFERENCE: &str = "push/difference";
+    /// What it really left.
     pub const HAPPENED: &str = "push/happened";
+    /// Where a gain comes from.
     pub const GAIN: &str = "gain";
+    /// The belief of the second episode.
     pub const OTHER: &str = "other/belief";
+    /// Its true objects.
     pub const OTHER_OBJECTS: &str = "other/objects";
+    /// How the two beliefs differ.
     pub const BETWEEN: &str = "between";
+    /// What the pointer is over.
     pub const HOVERED: &str = "pointer/hovered";
+    /// What is asked about.
     pub const PICKED: &str = "pointer/picked";
 }
 
@@ -104,9 +122,11 @@ pub struct Space {
     pub gain: Option<GainSource>,
 }
 
+type VoxelsOf = BTreeMap<&'static str, Arc<Vec<usize>>>;
+
 /// Which voxel every drawn instance of an entity is.
 #[derive(Clone, Default)]
-pub struct Drawn(Arc<Mutex<BTreeMap<&'static str, Arc<Vec<usize>>>>>);
+pub struct Drawn(Arc<Mutex<VoxelsOf>>);
 
 impl Drawn {
     /// The voxel of an instance.

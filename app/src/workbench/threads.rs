@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
+type List = Vec<(PathBuf, JoinHandle<()>)>;
+
 /// The episodes' threads, each with the directory that it writes. All clones are the same list.
 #[derive(Clone, Debug, Default)]
-pub struct Threads(Arc<Mutex<Vec<(PathBuf, JoinHandle<()>)>>>);
+pub struct Threads(Arc<Mutex<List>>);
 
 impl Threads {
     /// Remembers a thread.

@@ -59,9 +59,11 @@ impl Viewer {
             .build()
             .map_err(|error| error.to_string())?;
         let clicked = Rc::new(RefCell::new(None));
-        let mut options = re_viewer::StartupOptions::default();
-        options.persist_state = false;
-        options.hide_welcome_screen = true;
+        let mut options = re_viewer::StartupOptions {
+            persist_state: false,
+            hide_welcome_screen: true,
+            ..re_viewer::StartupOptions::default()
+        };
         options.panel_state_overrides.top = Some(PanelState::Hidden);
         options.panel_state_overrides.blueprint = Some(PanelState::Hidden);
         options.panel_state_overrides.selection = Some(PanelState::Hidden);

@@ -27,7 +27,8 @@ pub enum Obstacle {
     Table,
     /// The arm itself.
     Arm {
-        /// The other link.
+        /// The other link. In files it has a name of its own: a [`Hit`] has a link beside it.
+        #[serde(rename = "other_link")]
         link: String,
     },
 }

@@ -145,7 +145,7 @@ impl Window {
     }
 
     /// The one control of this name; text that says the same does not count.
-    fn control(&self, label: &str) -> Node<'_> {
+    fn control<'a>(&'a self, label: &'a str) -> Node<'a> {
         let is_text = |node: &Node<'_>| node.accesskit_node().role() == egui::accesskit::Role::Label;
         let mut controls: Vec<Node<'_>> = Vec::new();
         controls.extend(self.harness.query_all(by().label(label)).filter(|node| !is_text(node)));

@@ -222,7 +222,7 @@ pub fn push_table(
 }
 
 /// What pointing at or clicking a push leads to.
-pub fn apply_push(table: table::Touched, decision: &Decision, touched: &mut Touched, ask: &mut Vec<Command>) {
+pub(super) fn apply_push(table: table::Touched, decision: &Decision, touched: &mut Touched, ask: &mut Vec<Command>) {
     let push = |at: usize| decision.candidates.get(at).map(|candidate| candidate.push);
     if let Some(push) = table.over.and_then(push) {
         touched.over = Some(Hovered::Push(push));

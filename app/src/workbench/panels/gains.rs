@@ -344,7 +344,6 @@ fn framed(painter: &Painter, square: Rect, rank: &str, ui: &Ui) {
 mod tests {
     use super::*;
     use nudge_core::grid::Voxel;
-    use std::sync::Arc;
 
     #[test]
     fn a_gain_is_parted_by_height_and_depth() {

@@ -58,7 +58,7 @@ mod tests {
     fn a_picture_is_painted_once_and_the_oldest_go() {
         let (ctx, mut textures, mut painted) = (Context::default(), Textures::<usize>::default(), 0);
         let mut ask = |key: usize| {
-            textures.get(&ctx, key, || {
+            let _picture = textures.get(&ctx, key, || {
                 painted += 1;
                 ColorImage::filled([2, 2], Color32::WHITE)
             });

@@ -11,6 +11,7 @@ mod generate;
 mod mesh;
 pub mod outline;
 mod overlap;
+mod rescale;
 mod shape;
 
 #[cfg(test)]
@@ -23,6 +24,7 @@ pub use file::FORMAT;
 pub use generate::{GenerateConfig, generate};
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
+pub use rescale::rescale;
 pub use shape::Shape;
 
 use crate::grid::Grid;

@@ -11,6 +11,7 @@ mod generate;
 mod mesh;
 pub mod outline;
 mod overlap;
+mod rescale;
 pub(crate) mod robot;
 mod shape;
 
@@ -25,6 +26,7 @@ pub use generate::{GenerateConfig, generate};
 pub(crate) use mesh::read_mesh_points;
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
+pub use rescale::rescale;
 pub use robot::{RobotFile, RobotPlacement};
 pub use shape::Shape;
 

@@ -2,13 +2,13 @@
 //!
 //! Times of one thread are processor times, so that a busy machine does not count.
 
-use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, Pusher, RobotPlacement, Space, level_tool, plan};
+use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, Pusher, level_tool, plan};
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, project, render};
 use nudge_core::grid::VoxelSet;
 use nudge_core::push::sample_by;
 use nudge_core::rng::stream;
-use nudge_core::scene::{Catalog, Scene};
+use nudge_core::scene::{Catalog, RobotPlacement, Scene};
 use nudge_core::world::{TruthMap, World};
 use parry3d::query::distance;
 use parry3d::shape::{Ball, Voxels};

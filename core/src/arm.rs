@@ -36,7 +36,7 @@ mod urdf;
 pub use clearance::{Hit, Obstacle};
 pub use cover::Ball;
 pub use distance::DistanceField;
-pub use hand::{HAND_M_S, HandPose};
+pub use hand::{HAND_M_S, HandFault, HandPose};
 pub use joints::{Joints, MAX_JOINTS};
 pub use line::{Follow, LINE_STEP_M, SINGULARITY_MARGIN, follow_line};
 pub use model::{Arm, BodyPoses, Joint, JointKind, Part, Role};

@@ -8,6 +8,7 @@ use nudge_core::camera::{View, ViewArray};
 use nudge_core::push::TOOL_HEIGHT_M;
 use nudge_core::scene::{Catalog, RobotPlacement, Scene, Shelf};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -85,6 +86,8 @@ struct ViewsReport {
     array: String,
     views: usize,
     reachable: Vec<u16>,
+    /// How many of the others are out of reach for which reason.
+    faults: BTreeMap<String, usize>,
 }
 
 /// Runs the command.
@@ -142,10 +145,17 @@ fn report(
         upper: joint.upper,
         speed: joint.speed,
     });
-    let of_array = |(array, views): (&ViewArray, &Vec<(View, bool)>)| ViewsReport {
-        array: array.name.clone(),
-        views: views.len(),
-        reachable: views.iter().filter(|(_, reached)| *reached).map(|(view, _)| view.id.0).collect(),
+    let of_array = |(array, views): (&ViewArray, &Vec<(View, bool)>)| {
+        let mut faults = BTreeMap::new();
+        for (view, _) in views.iter().filter(|(_, reached)| !reached) {
+            *faults.entry(tool.hand_fault(&view.world_from_camera).to_string()).or_default() += 1;
+        }
+        ViewsReport {
+            array: array.name.clone(),
+            views: views.len(),
+            reachable: views.iter().filter(|(_, reached)| *reached).map(|(view, _)| view.id.0).collect(),
+            faults,
+        }
     };
     Report {
         name: arm.name.clone(),
@@ -195,6 +205,9 @@ fn table(report: &Report) -> String {
     let _ = writeln!(text, "  reach      {words} ({:.0} mm above it, gripper level)", 1e3 * report.reach.height_m);
     for views in &report.views {
         let _ = writeln!(text, "  views      {} of {} in {}", views.reachable.len(), views.views, views.array);
+        for (words, count) in &views.faults {
+            let _ = writeln!(text, "             {count} not: {words}");
+        }
     }
     text
 }

@@ -1,7 +1,7 @@
 //! How much room an arm has in a configuration, and what is in its way.
 
 use super::model::{Part, Role};
-use super::space::{MAP_MARGIN_M, MapObstacles, PANELS, SHELF_MARGIN_M, Space};
+use super::space::{Gripper, MAP_MARGIN_M, MapObstacles, PANELS, SHELF_MARGIN_M, Space};
 use super::{Ball, Frame, Joints};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
@@ -130,10 +130,11 @@ impl Space<'_> {
                 }
             }
             if let Some(map) = &self.map
+                && !(part.role == Role::Tool && map.gripper == Gripper::MayTouch)
                 && map.field.distance_m(&whole.center) - whole.radius_m - MAP_MARGIN_M < least
             {
                 for ball in balls() {
-                    let distance = self.map_distance_m(map, &ball, part.role);
+                    let distance = map.field.distance_m(&ball.center);
                     least = note(distance - ball.radius_m - MAP_MARGIN_M, Met::Map(ball.center));
                 }
             }
@@ -163,27 +164,12 @@ impl Space<'_> {
         room
     }
 
-    /// Distance from a ball's centre to the map. The field knows nothing of what the tool may touch, so where that could
-    /// matter the voxels around are looked at one by one.
-    fn map_distance_m(&self, map: &MapObstacles<'_>, ball: &Placed, role: Role) -> f64 {
-        let distance = map.field.distance_m(&ball.center);
-        let needed = ball.radius_m + MAP_MARGIN_M;
-        match map.touchable {
-            Some(touchable) if role == Role::Tool && distance < needed => {
-                nearest_voxel(map, &ball.center, needed, |cell| !touchable(cell)).map_or(needed, |near| near.distance_m)
-            }
-            _ => distance,
-        }
-    }
-
     /// Centre of the occupied voxel that is nearest to a point, or the point itself.
     fn voxel_near(&self, point: Point3<f64>) -> [f32; 3] {
         let near = self.map.as_ref().and_then(|map| {
-            let touchable = map.touchable;
-            let counts = |cell: usize| touchable.is_none_or(|touchable| !touchable(cell));
-            nearest_voxel(map, &point, map.field.cap_m().min(PLENTY_M), counts)
+            nearest_voxel(map, &point, map.field.cap_m().min(PLENTY_M))
         });
-        near.map_or_else(|| point.map(|v| v as f32).coords.into(), |near| near.center)
+        near.unwrap_or_else(|| point.map(|v| v as f32).coords.into())
     }
 }
 
@@ -196,19 +182,8 @@ enum Met {
     Part(usize),
 }
 
-/// A voxel and how far it is.
-struct NearVoxel {
-    center: [f32; 3],
-    distance_m: f64,
-}
-
-/// The nearest occupied voxel within `reach_m` whose floor cell `counts`.
-fn nearest_voxel(
-    map: &MapObstacles<'_>,
-    point: &Point3<f64>,
-    reach_m: f64,
-    counts: impl Fn(usize) -> bool,
-) -> Option<NearVoxel> {
+/// Centre of the nearest occupied voxel within `reach_m`.
+fn nearest_voxel(map: &MapObstacles<'_>, point: &Point3<f64>, reach_m: f64) -> Option<[f32; 3]> {
     let grid = map.field.grid();
     let voxel_m = f64::from(grid.voxel_m);
     let reach = reach_m + 0.5 * voxel_m;
@@ -217,14 +192,14 @@ fn nearest_voxel(
         at(point[axis] - reach).floor() as usize..at(point[axis] + reach).ceil() as usize
     };
     let center = |axis: usize, i: usize| f64::from(grid.origin[axis]) + (i as f64 + 0.5) * voxel_m;
-    let mut best: Option<NearVoxel> = None;
+    let mut best = None;
     let mut limit = reach * reach;
     for x in range(0) {
         let dx = (center(0, x) - point.x).powi(2);
         for y in range(1) {
             let on_plan = dx + (center(1, y) - point.y).powi(2);
             let cell = x * grid.dims[1] + y;
-            if on_plan > limit || !counts(cell) {
+            if on_plan > limit {
                 continue;
             }
             for z in range(2) {
@@ -232,7 +207,7 @@ fn nearest_voxel(
                 if squared < limit && map.occupied.contains(cell * grid.dims[2] + z) {
                     limit = squared;
                     let at = [center(0, x) as f32, center(1, y) as f32, center(2, z) as f32];
-                    best = Some(NearVoxel { center: at, distance_m: squared.sqrt() - 0.5 * voxel_m });
+                    best = Some(at);
                 }
             }
         }

@@ -7,7 +7,7 @@
 use super::plan::is_segment_free;
 use super::pusher::ArmTool;
 use super::shortcut::shortcut;
-use super::{Joints, Motion, Space, frame_of};
+use super::{Hit, Joints, Motion, Space, frame_of};
 use crate::Pose;
 use crate::rng::ChaCha8Rng;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -41,6 +41,27 @@ impl HandPose {
     }
 }
 
+/// Why the hand cannot be somewhere.
+#[derive(Clone, Debug, PartialEq)]
+pub enum HandFault {
+    /// No configuration within the limits has the camera there.
+    OutOfReach,
+    /// Something is in the way of the configuration that comes closest.
+    Blocked(Hit),
+    /// It could be there, but no way there was found.
+    NoWay,
+}
+
+impl std::fmt::Display for HandFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::OutOfReach => write!(f, "out of reach"),
+            Self::Blocked(hit) => write!(f, "{hit}"),
+            Self::NoWay => write!(f, "no free way there"),
+        }
+    }
+}
+
 impl ArmTool {
     /// Per camera pose, how the hand gets there; `None` where it cannot be.
     ///
@@ -50,12 +71,8 @@ impl ArmTool {
         let mut reached: Vec<Option<HandPose>> = vec![None; world_from_camera.len()];
         let Some(ready) = self.ready else { return reached };
         let space = Space::closed(&self.arm, &self.shelf);
-        // Upright first; a picture that was taken upside down is turned.
-        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
         let places = |pose: &Pose| -> Vec<Joints> {
-            let camera = frame_of(pose);
-            let tools = [camera, camera * half_turn].into_iter().filter_map(|camera| self.arm.tool_for_camera(&camera));
-            let branches = tools.flat_map(|tool| self.arm.inverse(&tool, &ready));
+            let branches = self.branches(pose, &ready).into_iter();
             branches.filter(|joints| space.room_m(joints) >= 0.0).collect()
         };
         let places: Vec<Vec<Joints>> = world_from_camera.par_iter().map(places).collect();
@@ -77,6 +94,28 @@ impl ArmTool {
             }
         }
         reached
+    }
+
+    /// Configurations that have the camera at a pose: upright first, then upside down, since a picture is easily turned.
+    fn branches(&self, pose: &Pose, ready: &Joints) -> Vec<Joints> {
+        let half_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI);
+        let camera = frame_of(pose);
+        let tools = [camera, camera * half_turn].into_iter().filter_map(|camera| self.arm.tool_for_camera(&camera));
+        tools.flat_map(|tool| self.arm.inverse(&tool, ready)).collect()
+    }
+
+    /// Why the hand cannot be at a camera pose for which [`ArmTool::hand_poses`] finds no way.
+    pub fn hand_fault(&self, pose: &Pose) -> HandFault {
+        let Some(ready) = self.ready else { return HandFault::OutOfReach };
+        let space = Space::closed(&self.arm, &self.shelf);
+        let closest = self
+            .branches(pose, &ready)
+            .into_iter()
+            .max_by(|a, b| space.room_m(a).total_cmp(&space.room_m(b)));
+        match closest {
+            None => HandFault::OutOfReach,
+            Some(joints) => space.hit(&joints).map_or(HandFault::NoWay, HandFault::Blocked),
+        }
     }
 
     /// The hand's motion from one place to another, outside the shelf: straight if that is free, else a shortened way past

@@ -182,6 +182,13 @@ impl Arm {
         times.fold(0.0, f64::max)
     }
 
+    /// The link that the gripper's first part belongs to; the last link where there is no gripper.
+    pub fn gripper_name(&self) -> &str {
+        let parts = self.bodies.last().into_iter().flatten();
+        let tool = parts.clone().find(|part| part.role == Role::Tool).or(parts.last());
+        tool.map_or("gripper", |part| part.link.as_str())
+    }
+
     /// Whether the inverse is computed in closed form.
     pub fn has_closed_form(&self) -> bool {
         self.closed_form.is_some()

@@ -46,13 +46,22 @@ pub struct Space<'a> {
     pub(super) map: Option<MapObstacles<'a>>,
 }
 
+/// What the gripper may do with what is on the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Gripper {
+    /// It keeps the margin like all parts of the arm.
+    KeepsAway,
+    /// It may touch.
+    MayTouch,
+}
+
 /// Voxels that are believed to be there, with the distances to them.
 #[derive(Clone, Copy)]
 pub(super) struct MapObstacles<'a> {
     pub occupied: &'a VoxelSet,
     pub field: &'a DistanceField,
-    /// Floor cells whose voxels the tool may touch.
-    pub touchable: Option<&'a (dyn Fn(usize) -> bool + Sync)>,
+    /// Whether the gripper counts too; while it pushes it is checked voxel by voxel instead ([`Arm::gripper_touches`]).
+    pub gripper: Gripper,
 }
 
 impl<'a> Space<'a> {
@@ -84,15 +93,15 @@ impl<'a> Space<'a> {
 
     /// The same with voxels that must not be touched, and the distances to them.
     pub fn with_map(mut self, occupied: &'a VoxelSet, field: &'a DistanceField) -> Self {
-        self.map = Some(MapObstacles { occupied, field, touchable: None });
+        self.map = Some(MapObstacles { occupied, field, gripper: Gripper::KeepsAway });
         self
     }
 
-    /// The same, but the tool may touch what stands on the floor cells that `touchable` names.
-    pub fn touching(&self, touchable: &'a (dyn Fn(usize) -> bool + Sync)) -> Self {
+    /// The same, but the gripper may touch what the map has.
+    pub fn pushing(&self) -> Self {
         let mut space = self.clone();
         if let Some(map) = &mut space.map {
-            map.touchable = Some(touchable);
+            map.gripper = Gripper::MayTouch;
         }
         space
     }

@@ -283,9 +283,11 @@ fn hits_say_what_meets_what() {
     let inside = arm.inverse(&pose, &ready);
     let hit = inside.iter().find_map(|joints| space.hit(joints)).expect("the finger on the voxel");
     assert!(hit.to_string().contains("gripper_link would meet what is believed to stand at (0.00"), "{hit}");
-    let touchable = |_: usize| true;
-    let touching = space.touching(&touchable);
-    assert!(inside.iter().any(|joints| touching.is_free(joints)), "the tool may touch it");
+    let pushing = space.pushing();
+    assert!(inside.iter().any(|joints| pushing.is_free(joints)), "the gripper may touch it");
+    let touched = |tip: [f64; 3]| arm.gripper_touches(&tool_at(tip), &field, |index| occupied.contains(index));
+    assert!(touched([0.0, 0.1, 0.1]).is_some() && touched([0.0, 0.12, 0.1]).is_some());
+    assert!(touched([0.0, 0.08, 0.1]).is_none() && touched([0.0, 0.1, 0.13]).is_none());
 }
 
 /// The tool at a point, level, pointing into the shelf.

@@ -19,7 +19,7 @@ use nalgebra::Vector3;
 /// Occupancy probability above which the arm keeps away from a voxel.
 pub const AVOIDED: f32 = 0.7;
 /// Ways from the waiting place that the planner searches for, per push, where none is straight.
-const QUERIES: usize = 2;
+const QUERIES: usize = 0;
 /// A query that only tries straight ways.
 const STRAIGHT: PlanSettings = PlanSettings { rounds: 0, shortcuts: 0 };
 /// Work of one query: a push that takes long to plan is one that another push can replace.

@@ -2,8 +2,7 @@ use super::*;
 use std::sync::mpsc::channel;
 
 fn with(classes: &[(&str, [f32; 2])]) -> Author {
-    let mut author = Author::default();
-    author.snap = Snap::Off;
+    let mut author = Author { snap: Snap::Off, ..Author::default() };
     for (class, position) in classes {
         author.add_at(class, *position);
     }

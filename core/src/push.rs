@@ -38,6 +38,8 @@ pub const REACH_M: f32 = 0.06;
 pub const LENGTH_M: [f32; 2] = [0.05, 0.15];
 /// At most this many frontier points are tried for each feasible candidate asked for.
 pub const DRAWS_PER_CANDIDATE: usize = 10;
+/// The same where an arm pushes: each takes longer to check, and more of them fail.
+pub const ARM_DRAWS_PER_CANDIDATE: usize = 4;
 
 /// Why a candidate is no candidate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -179,6 +181,14 @@ enum Check<'a> {
 }
 
 impl Check<'_> {
+    /// How many frontier points are tried for each feasible candidate asked for.
+    fn draws_per_candidate(&self) -> usize {
+        match self {
+            Self::Free { .. } => DRAWS_PER_CANDIDATE,
+            Self::Arm { .. } => ARM_DRAWS_PER_CANDIDATE,
+        }
+    }
+
     /// The tool whose shape a rejected candidate is shown with.
     fn tool(&self) -> &Tool {
         match self {
@@ -192,7 +202,7 @@ fn sample_checked(belief: &Belief, check: &Check<'_>, count: usize, rng: &mut Ch
     /// Draws that are checked together; fixed, so that it never matters who checks them.
     const BATCH: usize = 32;
     let mut points = frontier(belief);
-    let draws = points.len().min(count * DRAWS_PER_CANDIDATE);
+    let draws = points.len().min(count * check.draws_per_candidate());
     let mut candidates = Vec::new();
     let mut feasible = 0;
     for first in (0..draws).step_by(BATCH) {

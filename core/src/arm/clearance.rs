@@ -7,7 +7,10 @@ use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 /// Room beyond this is not told apart, metres.
-const PLENTY_M: f64 = 0.10;
+const PLENTY_M: f64 = 0.06;
+/// The balls of two links stick out of them by about this much together, metres, which the arm's own links need not keep
+/// from each other.
+const OVERSHOOT_M: f64 = 0.010;
 
 /// What an arm meets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,7 +78,7 @@ impl Placed {
 
 impl Space<'_> {
     /// How far every point of the arm may at least move before anything is touched or a margin is broken, metres, at
-    /// most a decimetre. Zero or less where the arm may not be.
+    /// most 6 cm. Zero or less where the arm may not be.
     pub fn room_m(&self, joints: &Joints) -> f64 {
         self.measure(joints, PLENTY_M, |_, _| ())
     }
@@ -121,21 +124,25 @@ impl Space<'_> {
                     least = note(above(&ball), Met::Table);
                 }
             }
-            for (panel, slab) in self.panels.iter().enumerate() {
-                let gap = |ball: &Placed| slab.distance_m(&ball.center) - ball.radius_m - SHELF_MARGIN_M;
-                if gap(&whole) < least {
-                    for ball in balls() {
-                        least = note(gap(&ball), Met::Panel(panel));
-                    }
-                }
+            // Most of the arm is far before the shelf most of the time.
+            let beside = |ball: &Placed, least: f64| {
+                self.outer.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M.max(SHELF_MARGIN_M) < least
+            };
+            if !beside(&whole, least) {
+                continue;
             }
-            if let Some(map) = &self.map
-                && !(part.role == Role::Tool && map.gripper == Gripper::MayTouch)
-                && map.field.distance_m(&whole.center) - whole.radius_m - MAP_MARGIN_M < least
-            {
-                for ball in balls() {
-                    let distance = map.field.distance_m(&ball.center);
-                    least = note(distance - ball.radius_m - MAP_MARGIN_M, Met::Map(ball.center));
+            let map = self.map.as_ref().filter(|map| part.role == Role::Link || map.gripper == Gripper::KeepsAway);
+            for ball in balls() {
+                if !beside(&ball, least) {
+                    continue;
+                }
+                for (panel, slab) in self.panels.iter().enumerate() {
+                    let gap = slab.distance_m(&ball.center) - ball.radius_m - SHELF_MARGIN_M;
+                    least = note(gap, Met::Panel(panel));
+                }
+                if let Some(map) = map {
+                    let gap = map.field.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M;
+                    least = note(gap, Met::Map(ball.center));
                 }
             }
         }
@@ -153,7 +160,7 @@ impl Space<'_> {
                     continue;
                 }
                 for of_b in second.balls.iter().map(|ball| Placed::of(ball, &poses[body_b])) {
-                    let value = 0.5 * of_a.gap_m(&of_b);
+                    let value = 0.5 * (of_a.gap_m(&of_b) + OVERSHOOT_M);
                     if value < room {
                         room = value;
                         closer(usize::from(a), Met::Part(usize::from(b)));

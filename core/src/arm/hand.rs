@@ -4,12 +4,12 @@
 //! clear of table, shelf and the arm itself (upright, or upside down), and there is a way to it from where the arm waits. While it looks the arm
 //! stays out of the shelf altogether, whatever may stand in it.
 
-use super::plan::is_segment_free;
+use super::plan::{PlanSettings, is_segment_free, plan};
 use super::pusher::ArmTool;
 use super::shortcut::shortcut;
 use super::{Hit, Joints, Motion, Space, frame_of};
 use crate::Pose;
-use crate::rng::ChaCha8Rng;
+use crate::rng::{ChaCha8Rng, stream};
 use nalgebra::{UnitQuaternion, Vector3};
 use rayon::prelude::*;
 
@@ -19,6 +19,9 @@ pub const HAND_M_S: f64 = 0.50;
 const SHORTCUTS: usize = 30;
 /// Places that the hand already reaches from which it is tried to go on to a view, the nearest first.
 const NEIGHBOURS: usize = 4;
+/// Work of the search for a view that no straight way leads to, and how many such searches may fail.
+const QUERY: PlanSettings = PlanSettings { rounds: 300, shortcuts: 20 };
+const SEARCHES: usize = 4;
 /// How often the views that were not reached are tried again from what has been reached since.
 const PASSES: usize = 3;
 
@@ -81,7 +84,8 @@ impl ArmTool {
         let mut order: Vec<usize> = (0..places.len()).filter(|view| !places[*view].is_empty()).collect();
         order.sort_by(|a, b| travel(*a).total_cmp(&travel(*b)).then(a.cmp(b)));
         let mut roadmap = vec![HandPose::waiting(ready)];
-        for _ in 0..PASSES {
+        let mut failed = 0;
+        for pass in 0..PASSES * (1 + SEARCHES) {
             let before = roadmap.len();
             order.retain(|&view| {
                 let hand = places[view].iter().find_map(|joints| go_on(&space, &roadmap, joints));
@@ -89,8 +93,20 @@ impl ArmTool {
                 reached[view] = hand;
                 reached[view].is_none()
             });
-            if roadmap.len() == before || order.is_empty() {
-                break;
+            if roadmap.len() > before {
+                continue;
+            }
+            // None of the rest is a straight way away: a search for one of them may bring its neighbours too.
+            let Some(view) = order.get(failed * order.len() / SEARCHES).copied().filter(|_| failed < SEARCHES) else { break };
+            let goals: Vec<Vec<Joints>> = places[view].iter().map(|joints| vec![*joints]).collect();
+            match plan(&space, &ready, &goals, QUERY, &mut stream(0, "ways of the hand", pass as u64)) {
+                Some(planned) => {
+                    let hand = HandPose { way: planned.path };
+                    roadmap.push(hand.clone());
+                    reached[view] = Some(hand);
+                    order.retain(|other| *other != view);
+                }
+                None => failed += 1,
             }
         }
         reached

@@ -41,6 +41,8 @@ pub struct Space<'a> {
     /// The arm.
     pub arm: &'a Arm,
     pub(super) panels: Vec<Slab>,
+    /// A box around them and all that they hold.
+    pub(super) outer: Slab,
     /// Height of the table that the arm stands on, metres.
     pub(super) table_z: f64,
     pub(super) map: Option<MapObstacles<'a>>,
@@ -79,6 +81,7 @@ impl<'a> Space<'a> {
                 slab([max.x, min.y, min.z], [max.x + t, max.y, max.z]),
                 slab([min.x - t, min.y, max.z], [max.x + t, max.y + t, max.z + t]),
             ],
+            outer: slab([min.x - t, min.y, min.z - t], [max.x + t, max.y + t, max.z + t]),
             table_z: arm.world_from_base.translation.z,
             map: None,
         }

@@ -21,10 +21,14 @@ pub const AVOIDED: f32 = 0.7;
 const QUERIES: usize = 0;
 /// Distance of the gripper's poses that are checked along a line, metres: two voxels of the standard grid.
 const GRIPPER_STEP_M: f64 = 0.01;
+/// Branches of the inverse that are tried per turn, those nearest to where the arm waits first.
+const BRANCHES: usize = 3;
+/// Ways in that are tried per push.
+const ATTEMPTS: usize = 3;
 /// A query that only tries straight ways.
 const STRAIGHT: PlanSettings = PlanSettings { rounds: 0, shortcuts: 0 };
 /// Work of one query: a push that takes long to plan is one that another push can replace.
-const QUERY: PlanSettings = PlanSettings { rounds: 80, shortcuts: 10 };
+const QUERY: PlanSettings = PlanSettings { rounds: 40, shortcuts: 10 };
 
 /// A belief prepared for checking many pushes by an arm.
 pub struct ArmClearance<'a> {
@@ -113,7 +117,10 @@ impl<'a> ArmClearance<'a> {
                 continue;
             }
             let (free, out_hit) = self.gripper_hit(&pose, &Vector3::new(0.0, -out, 0.0), target);
-            for start in arm.inverse(&pose, &ready) {
+            for start in arm.inverse(&pose, &ready).into_iter().take(BRANCHES) {
+                if goals.len() == ATTEMPTS {
+                    break;
+                }
                 if let Some(hit) = pushing.hit(&start) {
                     reason.deeper(1, blocked(Stage::Start, hit));
                     continue;

@@ -425,7 +425,7 @@ fn setting(episode: &Episode) -> Setting<'_> {
         views: episode.views(),
         budget: record.config.budget,
         gamma: record.config.planner.gamma,
-        arm: Some(episode.arm()),
+        arm: Some(episode.arm().as_ref()).filter(|_| episode.is_by_arm()),
         unreachable: episode.unreachable_views(),
     }
 }

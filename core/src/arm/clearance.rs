@@ -173,9 +173,7 @@ impl Space<'_> {
 
     /// Centre of the occupied voxel that is nearest to a point, or the point itself.
     fn voxel_near(&self, point: Point3<f64>) -> [f32; 3] {
-        let near = self.map.as_ref().and_then(|map| {
-            nearest_voxel(map, &point, map.field.cap_m().min(PLENTY_M))
-        });
+        let near = self.map.as_ref().and_then(|map| nearest_voxel(map, &point, map.field.cap_m().min(PLENTY_M)));
         near.unwrap_or_else(|| point.map(|v| v as f32).coords.into())
     }
 }

@@ -97,7 +97,9 @@ impl ArmTool {
                 continue;
             }
             // None of the rest is a straight way away: a search for one of them may bring its neighbours too.
-            let Some(view) = order.get(failed * order.len() / SEARCHES).copied().filter(|_| failed < SEARCHES) else { break };
+            let Some(view) = order.get(failed * order.len() / SEARCHES).copied().filter(|_| failed < SEARCHES) else {
+                break;
+            };
             let goals: Vec<Vec<Joints>> = places[view].iter().map(|joints| vec![*joints]).collect();
             match plan(&space, &ready, &goals, QUERY, &mut stream(0, "ways of the hand", pass as u64)) {
                 Some(planned) => {
@@ -124,10 +126,8 @@ impl ArmTool {
     pub fn hand_fault(&self, pose: &Pose) -> HandFault {
         let Some(ready) = self.ready else { return HandFault::OutOfReach };
         let space = Space::closed(&self.arm, &self.shelf);
-        let closest = self
-            .branches(pose, &ready)
-            .into_iter()
-            .max_by(|a, b| space.room_m(a).total_cmp(&space.room_m(b)));
+        let closest =
+            self.branches(pose, &ready).into_iter().max_by(|a, b| space.room_m(a).total_cmp(&space.room_m(b)));
         match closest {
             None => HandFault::OutOfReach,
             Some(joints) => space.hit(&joints).map_or(HandFault::NoWay, HandFault::Blocked),

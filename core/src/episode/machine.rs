@@ -7,7 +7,7 @@ use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion, Pusher};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::Grid;
-use crate::plan::{self, Action, Decision, History, Reason, Situation};
+use crate::plan::{self, Action, Decision, History, PushedBy, Reason, Situation};
 use crate::push::ArmClearance;
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
@@ -64,7 +64,8 @@ impl Episode {
         let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         let hands = Arc::new(views.hand_poses(&arm));
-        let unreachable = Arc::new(views.unreachable(&hands));
+        let by_arm = config.planner.pushed_by == PushedBy::Arm;
+        let unreachable = Arc::new(if by_arm { views.unreachable(&hands) } else { Default::default() });
         let mut world = World::new(scene.shelf, scene.bodies(&catalog)?);
         world.settle();
         let bodies = Arc::new(world.bodies());
@@ -84,7 +85,7 @@ impl Episode {
             update,
             views,
             tool: Arc::new(Tool::standard()),
-            hand: arm.ready.map(HandPose::waiting),
+            hand: arm.ready.map(HandPose::waiting).filter(|_| by_arm),
             arm,
             hands,
             unreachable,
@@ -105,11 +106,15 @@ impl Episode {
             Some(view) => self.update.observe(&self.belief, &self.observe(view).1),
             None => (*self.belief).clone(),
         };
+        let pusher = match self.record.config.planner.pushed_by {
+            PushedBy::Tool => Pusher::Free((*self.tool).clone()),
+            PushedBy::Arm => Pusher::Arm(self.arm.clone()),
+        };
         let situation = Situation {
             belief: &self.belief,
             update: &*self.update,
             views: &self.views,
-            pusher: &Pusher::Arm(self.arm.clone()),
+            pusher: &pusher,
             unreachable: &self.unreachable,
             history: &self.history,
             budget: self.record.config.budget,
@@ -175,14 +180,24 @@ impl Episode {
             return Err(Error::Usage(format!("a push must be a finite motion, not {numbers:?}")));
         }
         let started = Instant::now();
-        let arm = self.arm.clone();
-        let motion = self.motion_for(&arm, &mut decision, &push)?;
-        let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
-        let outcome: PushOutcome = self.world.execute_motion(&arm.arm, &motion);
+        let (outcome, swept, motion): (PushOutcome, _, _) = match self.record.config.planner.pushed_by {
+            PushedBy::Tool => {
+                let tool = self.tool.clone();
+                (self.world.execute(&tool, &push), tool.swept_volume(&push, &self.grid()), None)
+            }
+            PushedBy::Arm => {
+                let arm = self.arm.clone();
+                let motion = self.motion_for(&arm, &mut decision, &push)?;
+                let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
+                let outcome = self.world.execute_motion(&arm.arm, &motion);
+                let swept = motion.swept_volume(&arm.arm, &self.grid());
+                (outcome, swept, Some((to_wait.duration_s(), to_wait.then(&motion.whole(&arm.arm)))))
+            }
+        };
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        let swept = SweptPush { push, swept: motion.swept_volume(&arm.arm, &self.grid()) };
+        let swept = SweptPush { push, swept };
         let prediction = self.predict(&swept, decision.reason);
         if let Some(prediction) = &prediction {
             Arc::make_mut(&mut self.belief).apply(prediction);
@@ -192,7 +207,7 @@ impl Episode {
         let happened = Happened {
             dropped: outcome.dropped.clone(),
             displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
-            motion_s: to_wait.duration_s() + f64::from(outcome.arm_s),
+            motion_s: motion.as_ref().map_or(0.0, |(to_wait_s, _)| to_wait_s + f64::from(outcome.arm_s)),
             push: Some(self.report(&outcome)),
         };
         let record = self.file(decision, happened, started, seconds);
@@ -203,7 +218,7 @@ impl Episode {
             swept: Some(swept),
             prediction,
             push_outcome: Some(outcome),
-            motion: Some(to_wait.then(&motion.whole(&arm.arm))),
+            motion: motion.map(|(_, motion)| motion),
         })
     }
 
@@ -358,6 +373,11 @@ impl Episode {
         &self.arm
     }
 
+    /// Whether the arm pushes and carries the camera.
+    pub fn is_by_arm(&self) -> bool {
+        self.record.config.planner.pushed_by == PushedBy::Arm
+    }
+
     /// Per view, how the hand gets there; `None` where it cannot be.
     pub fn hand_poses(&self) -> &[Option<HandPose>] {
         &self.hands
@@ -373,7 +393,7 @@ impl Episode {
     pub fn why_no_push(&self) -> Option<String> {
         let name = &self.arm.arm.name;
         let words = || format!("{name} reaches no place before the shelf from where it stands, so nothing is pushed");
-        self.arm.ready.is_none().then(words)
+        (self.is_by_arm() && self.arm.ready.is_none()).then(words)
     }
 
     /// The shape that stands for gripper and last links where no motion of the arm is known.

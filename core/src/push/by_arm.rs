@@ -7,7 +7,8 @@
 
 use super::{CONFIDENT, Rejection, STANDOFF_M, Stage};
 use crate::arm::{
-    Arm, ArmTool, DistanceField, Follow, Frame, Hit, Joints, Obstacle, PlanSettings, PushMotion, Space, follow_line, YAWS_DEG, level_tool, plan,
+    Arm, ArmTool, DistanceField, Follow, Frame, Hit, Joints, Obstacle, PlanSettings, PushMotion, Space, YAWS_DEG,
+    follow_line, level_tool, plan,
 };
 use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, beta_mean};
 use crate::grid::{Cell, Grid, Voxel, VoxelSet};
@@ -73,7 +74,8 @@ impl<'a> ArmClearance<'a> {
         let step = 0.5 * self.grid.voxel_m;
         let steps = (push.length_m / step).ceil() as usize;
         let track = (0..=steps).map(|i| push.start_point() + push.direction() * (step * i as f32));
-        let met = track.filter_map(|point| self.grid.voxel_at(point)).find(|v| self.avoided.contains(self.grid.index(*v)));
+        let met =
+            track.filter_map(|point| self.grid.voxel_at(point)).find(|v| self.avoided.contains(self.grid.index(*v)));
         let ahead = push.start_point() + push.direction() * STANDOFF_M;
         let voxel = met.or_else(|| self.grid.voxel_at(ahead)).unwrap_or(Voxel { x: 0, y: 0, z: 0 });
         self.target(voxel)

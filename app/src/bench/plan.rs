@@ -275,6 +275,7 @@ mod tests {
                 shelf: nudge_core::scene::Shelf::new([0.8, 0.4, 0.4]),
                 objects: Vec::new(),
                 meshes: std::collections::BTreeMap::new(),
+                robot: nudge_core::scene::RobotPlacement::default(),
             },
         };
         let policy = |policy| PolicyPlan { policy, belief: "classical".to_owned() };

@@ -120,6 +120,11 @@ pub fn errors(belief: &Belief, truth: &TruthMap) -> VoxelGridMap {
     colored(grid, &shown, |index| if believed(index) { colors::HALLUCINATED_RGB } else { colors::MISSED_RGB })
 }
 
+/// The voxels that are drawn of a gain: those that tell next to nothing are left out.
+pub(crate) fn telling(nats: &[(usize, f32)], top: f32) -> Vec<(usize, f32)> {
+    nats.iter().copied().filter(|(_, nats)| *nats > 0.05 * top).collect()
+}
+
 /// The gain per voxel at the top of the colour scale, nats: what only one voxel in a hundred exceeds.
 pub fn gain_top(nats: &[(usize, f32)]) -> f32 {
     let mut sorted: Vec<f32> = nats.iter().map(|(_, nats)| *nats).collect();
@@ -130,8 +135,7 @@ pub fn gain_top(nats: &[(usize, f32)]) -> f32 {
 /// Where a gain comes from (cividis, up to the 99th percentile so that a few voxels do not hide the rest).
 pub fn gains(grid: &Grid, nats: &[(usize, f32)]) -> VoxelGridMap {
     let top = gain_top(nats);
-    // Voxels that tell next to nothing are left out.
-    let telling: Vec<(usize, f32)> = nats.iter().copied().filter(|(_, nats)| *nats > 0.05 * top).collect();
+    let telling = telling(nats, top);
     let shown: Vec<usize> = telling.iter().map(|(index, _)| *index).collect();
     colored(grid, &shown, |index| {
         let at = telling.binary_search_by_key(&index, |(index, _)| *index).unwrap_or(0);

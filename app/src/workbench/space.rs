@@ -392,6 +392,8 @@ impl Painter {
         match source {
             Some(source) => {
                 self.log(at::GAIN, &crate::record::voxels::gains(grid, &source.nats));
+                let drawn = crate::record::voxels::telling(&source.nats, source.top);
+                self.drawn.set(at::GAIN, drawn.into_iter().map(|(index, _)| index).collect());
             }
             None => self.log_voxels(at::GAIN, grid, Vec::new(), |_| [0; 3]),
         }

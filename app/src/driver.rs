@@ -156,6 +156,9 @@ impl Driver {
     }
 }
 
+/// The names of the belief updates.
+pub const BELIEFS: [&str; 2] = ["classical", "cnabu"];
+
 /// The belief update that a policy runs with: the one named, or the policy's own. Says in the second value what a
 /// person should know about the choice.
 ///

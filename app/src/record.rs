@@ -232,9 +232,10 @@ impl Recorder {
         let Some(arm) = setting.arm else { return Ok(()) };
         let pose = |joints: &Joints| {
             let transforms = robot::transforms(arm, joints);
-            transforms.iter().enumerate().try_for_each(|(number, transform)| {
-                self.log(&paths::robot_body(number), transform)
-            })
+            transforms
+                .iter()
+                .enumerate()
+                .try_for_each(|(number, transform)| self.log(&paths::robot_body(number), transform))
         };
         let moved = outcome.and_then(|outcome| Some((outcome, outcome.motion.as_ref()?)));
         let Some((outcome, motion)) = moved else {
@@ -396,7 +397,8 @@ impl Recorder {
     }
 
     fn check<T>(&self, result: std::result::Result<T, impl std::fmt::Display>) -> Result<T> {
-        result.map_err(|error| Error::io(&self.file, std::io::Error::other(error.to_string())))
+        // The file is written by a thread of the SDK's, which does not tell why it ended; mostly the disk is full.
+        result.map_err(|error| Error::input(&self.file, "", format!("the recording cannot be written ({error})")))
     }
 }
 

@@ -14,7 +14,7 @@ pub use rule::{PUSH_EVERY, QUIET_STEPS, SATURATION, look_or_push, push_guard, sa
 pub use weigh::{COARSE_VIEWS, disturbance};
 
 use crate::arm::{PushMotion, Pusher};
-use crate::belief::{Belief, BeliefUpdate};
+use crate::belief::{Belief, BeliefUpdate, CERTAIN, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::push::Rejection;
 use crate::tool::Push;
@@ -202,11 +202,26 @@ pub struct PlannerSettings {
     pub candidates: usize,
     /// Weight of the disturbance term.
     pub gamma: f32,
+    /// A floor cell whose likeliest class is more probable than this is certain.
+    pub certain: f32,
+    /// The map is complete, and nothing is pushed any more, once this share of the floor cells is certain.
+    pub complete: f32,
+    /// The first steps, in which nothing is pushed.
+    pub quiet_steps: usize,
+    /// The policy `saturation` pushes once two consecutive best gains differ by less than this share.
+    pub saturation: f32,
 }
 
 impl Default for PlannerSettings {
     fn default() -> Self {
-        Self { candidates: 80, gamma: GAMMA }
+        Self {
+            candidates: 80,
+            gamma: GAMMA,
+            certain: CERTAIN,
+            complete: COMPLETE_SHARE,
+            quiet_steps: QUIET_STEPS,
+            saturation: SATURATION,
+        }
     }
 }
 

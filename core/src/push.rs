@@ -248,13 +248,14 @@ fn draw_push(belief: &Belief, frontier: Voxel, rng: &mut ChaCha8Rng) -> Option<P
 fn candidate(belief: &Belief, check: &Check<'_>, number: u64, frontier: Voxel, push: Option<Push>) -> Candidate {
     let aimless = Push { start: start_of(belief, frontier), direction_deg: 90.0, length_m: LENGTH_M[0] };
     let straight = push.unwrap_or(aimless);
-    let of = |swept, rejection, motion| {
-        Candidate { frontier, swept: SweptPush { push: straight, swept }, rejection, motion }
+    let of = |swept, rejection, motion| Candidate {
+        frontier,
+        swept: SweptPush { push: straight, swept },
+        rejection,
+        motion,
     };
     match (check, push) {
-        (check, None) => {
-            of(check.tool().swept_volume(&straight, &belief.grid), Some(Rejection::NoTarget), None)
-        }
+        (check, None) => of(check.tool().swept_volume(&straight, &belief.grid), Some(Rejection::NoTarget), None),
         (Check::Free { tool, clearance }, Some(push)) => {
             let swept = tool.swept_volume(&push, &belief.grid);
             let rejection = clearance.check(tool, &push, &swept, &clearance.target(frontier));

@@ -11,6 +11,7 @@ mod generate;
 mod mesh;
 pub mod outline;
 mod overlap;
+mod rescale;
 pub(crate) mod robot;
 mod shape;
 
@@ -22,9 +23,10 @@ pub use catalog::{BACKGROUND, Background, CLASS_COUNT, Catalog, Class, ClassId, 
 pub use check::{MAX_OBJECTS, MAX_VOXELS, Problem};
 pub use file::FORMAT;
 pub use generate::{GenerateConfig, generate};
-pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
 pub(crate) use mesh::read_mesh_points;
+pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
+pub use rescale::rescale;
 pub use robot::{RobotFile, RobotPlacement};
 pub use shape::Shape;
 

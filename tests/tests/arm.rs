@@ -56,12 +56,37 @@ fn arms_that_are_no_arms() {
     let folder = folder();
     let good = shipped();
     let cases: &[(&str, &str, &str, &[&str])] = &[
-        ("mesh", r#"<box size="0.111 0.035 0.03"/>"#, r#"<mesh filename="no/such.stl"/>"#, &["line 44", "gripper_link", "no/such.stl"]),
-        ("kind", r#"name="elbow_joint" type="revolute""#, r#"name="elbow_joint" type="hinge""#, &["elbow_joint", "is hinge"]),
-        ("link", r#"<child link="wrist_1_link"/>"#, r#"<child link="wrist_7_link"/>"#, &["wrist_1_joint", "wrist_7_link"]),
+        (
+            "mesh",
+            r#"<box size="0.111 0.035 0.03"/>"#,
+            r#"<mesh filename="no/such.stl"/>"#,
+            &["line 44", "gripper_link", "no/such.stl"],
+        ),
+        (
+            "kind",
+            r#"name="elbow_joint" type="revolute""#,
+            r#"name="elbow_joint" type="hinge""#,
+            &["elbow_joint", "is hinge"],
+        ),
+        (
+            "link",
+            r#"<child link="wrist_1_link"/>"#,
+            r#"<child link="wrist_7_link"/>"#,
+            &["wrist_1_joint", "wrist_7_link"],
+        ),
         ("loop", r#"<child link="wrist_1_link"/>"#, r#"<child link="base_link"/>"#, &["shoulder_pan_joint", "loop"]),
-        ("length", r#"<origin xyz="0 -0.1197 0.425"/>"#, r#"<origin xyz="0 -0.1197 0"/>"#, &["elbow_joint", "no length"]),
-        ("limits", r#"lower="-3.141592653589793" upper="3.141592653589793""#, r#"lower="3" upper="-3""#, &["elbow_joint", "wrong way round"]),
+        (
+            "length",
+            r#"<origin xyz="0 -0.1197 0.425"/>"#,
+            r#"<origin xyz="0 -0.1197 0"/>"#,
+            &["elbow_joint", "no length"],
+        ),
+        (
+            "limits",
+            r#"lower="-3.141592653589793" upper="3.141592653589793""#,
+            r#"lower="3" upper="-3""#,
+            &["elbow_joint", "wrong way round"],
+        ),
         ("number", r#"<origin xyz="0 0 0.09465"/>"#, r#"<origin xyz="0 0"/>"#, &["wrist_3_joint", "3 numbers"]),
         ("xml", "</robot>", "", &["not a URDF file"]),
     ];
@@ -136,7 +161,8 @@ fn all_policies_push_through_the_arm_and_replay() {
         let out = folder.path().join(policy);
         let out = out.to_str().expect("utf-8");
         let scene = "scenes/high/key-blocker.toml";
-        let args = ["run", scene, "--belief", "classical", "--policy", policy, "--budget", budget, "--json", "--out", out];
+        let args =
+            ["run", scene, "--belief", "classical", "--policy", policy, "--budget", budget, "--json", "--out", out];
         let record: Value = serde_json::from_str(&nudge_ok(&args)).expect("JSON");
         let mut pushed = 0;
         for step in record["steps"].as_array().expect("steps") {
@@ -160,7 +186,8 @@ fn all_policies_push_through_the_arm_and_replay() {
 /// What is really in the crowded scenes that come with the program.
 fn crowded() -> Vec<(String, Scene, VoxelSet)> {
     let folder = root().join("scenes/high");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).expect("scenes").map(|e| e.expect("entry").path()).collect();
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder).expect("scenes").map(|e| e.expect("entry").path()).collect();
     files.retain(|file| file.extension().is_some_and(|e| e == "toml"));
     files.sort();
     let catalog = Catalog::standard();
@@ -179,7 +206,11 @@ fn goal(tool: &ArmTool, space: &Space<'_>, rng: &mut ChaCha8Rng) -> Joints {
     use rand::Rng;
     let ready = tool.ready.expect("a place to wait");
     loop {
-        let tip = nalgebra::Point3::new(rng.random_range(-0.35..0.35), rng.random_range(0.0..0.35), rng.random_range(0.05..0.20));
+        let tip = nalgebra::Point3::new(
+            rng.random_range(-0.35..0.35),
+            rng.random_range(0.0..0.35),
+            rng.random_range(0.05..0.20),
+        );
         let branches = tool.arm.inverse(&level_tool(&tip, rng.random_range(-0.6..0.6)), &ready);
         if branches.is_empty() {
             continue;

@@ -2,11 +2,11 @@
 
 use super::{print, to_json, warn};
 use crate::picture;
+use nudge_core::Error;
 use nudge_core::arm::{Arm, ArmTool, JointKind, Reach};
 use nudge_core::camera::{View, ViewArray};
 use nudge_core::push::TOOL_HEIGHT_M;
 use nudge_core::scene::{Catalog, RobotPlacement, Scene, Shelf};
-use nudge_core::Error;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

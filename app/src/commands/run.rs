@@ -1,7 +1,7 @@
 //! `nudge run`: map a scene with a policy and write the episode.
 
-use crate::record::mishaps;
 use crate::driver::{Driver, belief_update, default_out};
+use crate::record::mishaps;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};

@@ -100,7 +100,8 @@ fn block(low: [f32; 3], high: [f32; 3]) -> Option<ConvexPart> {
 fn draw_view(picture: &mut RgbImage, eye: &Eye, view: &View, intrinsics: &Intrinsics, reached: bool) {
     let half = [intrinsics.width, intrinsics.height].map(|n| 0.5 * n as f32 / intrinsics.focal_px * FRUSTUM_M);
     let size = picture.dimensions().into();
-    let place = |x: f32, y: f32, z: f32| eye.project(view.world_from_camera * Point::new(x * half[0], y * half[1], z), size);
+    let place =
+        |x: f32, y: f32, z: f32| eye.project(view.world_from_camera * Point::new(x * half[0], y * half[1], z), size);
     let apex = place(0.0, 0.0, 0.0);
     let base = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| place(x, y, FRUSTUM_M));
     let rgb = if reached { REACHED_RGB } else { OUT_OF_REACH_RGB };
@@ -118,7 +119,10 @@ fn line(picture: &mut RgbImage, from: [f32; 2], to: [f32; 2], rgb: Rgb) {
         let at = [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * share);
         for [dx, dy] in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]] {
             let [x, y] = [at[0] + dx - 0.5, at[1] + dy - 0.5];
-            if x >= 0.0 && y >= 0.0 && let Some(pixel) = picture.get_pixel_mut_checked(x as u32, y as u32) {
+            if x >= 0.0
+                && y >= 0.0
+                && let Some(pixel) = picture.get_pixel_mut_checked(x as u32, y as u32)
+            {
                 pixel.0 = rgb;
             }
         }

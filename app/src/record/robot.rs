@@ -64,8 +64,11 @@ pub fn path(arm: &ArmTool, motion: &Motion) -> rerun::LineStrips3D {
 pub fn reachable(array: &ViewArray, unreachable: &[ViewId]) -> rerun::Points3D {
     let reached = |id: &ViewId| !unreachable.contains(id);
     rerun::Points3D::new(array.views.iter().map(|view| <[f32; 3]>::from(view.position().coords)))
-        .with_colors(array.views.iter().map(|view| {
-            rerun::Color::from(if reached(&view.id) { REACHED_RGB } else { REJECTED_RGB })
-        }))
+        .with_colors(
+            array
+                .views
+                .iter()
+                .map(|view| rerun::Color::from(if reached(&view.id) { REACHED_RGB } else { REJECTED_RGB })),
+        )
         .with_radii(array.views.iter().map(|view| if reached(&view.id) { 0.005_f32 } else { 0.003 }))
 }

@@ -30,7 +30,8 @@ pub enum Obstacle {
     Table,
     /// The arm itself.
     Arm {
-        /// The other link.
+        /// The other link. In files it has a name of its own: a [`Hit`] has a link beside it.
+        #[serde(rename = "other_link")]
         link: String,
     },
 }
@@ -147,7 +148,8 @@ impl Space<'_> {
         }
         for &[a, b] in &self.arm.self_pairs {
             // Both sides may move, so each may use half of the gap.
-            let ([body_a, part_a], [body_b, part_b]) = (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
+            let ([body_a, part_a], [body_b, part_b]) =
+                (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
             let (first, second): (&Part, &Part) = (&self.arm.bodies[body_a][part_a], &self.arm.bodies[body_b][part_b]);
             let whole = Placed::of(&second.around, &poses[body_b]);
             if Placed::of(&first.around, &poses[body_a]).gap_m(&whole) >= 2.0 * room {

@@ -79,7 +79,8 @@ impl ArmTool {
             branches.filter(|joints| space.room_m(joints) >= 0.0).collect()
         };
         let places: Vec<Vec<Joints>> = world_from_camera.par_iter().map(places).collect();
-        let travel = |view: usize| places[view].iter().map(|q| self.arm.travel_m(q, &ready)).fold(f64::INFINITY, f64::min);
+        let travel =
+            |view: usize| places[view].iter().map(|q| self.arm.travel_m(q, &ready)).fold(f64::INFINITY, f64::min);
         let mut order: Vec<usize> = (0..places.len()).filter(|view| !places[*view].is_empty()).collect();
         order.sort_by(|a, b| travel(*a).total_cmp(&travel(*b)).then(a.cmp(b)));
         let mut roadmap = vec![HandPose::waiting(ready)];

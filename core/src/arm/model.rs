@@ -41,14 +41,12 @@ impl Joint {
     pub fn parent_from_child(&self, value: f64) -> Frame {
         self.parent_from_joint
             * match self.kind {
-                JointKind::Turning => Frame::from_parts(
-                    Translation3::identity(),
-                    UnitQuaternion::from_axis_angle(&self.axis, value),
-                ),
-                JointKind::Sliding => Frame::from_parts(
-                    Translation3::from(self.axis.into_inner() * value),
-                    UnitQuaternion::identity(),
-                ),
+                JointKind::Turning => {
+                    Frame::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&self.axis, value))
+                }
+                JointKind::Sliding => {
+                    Frame::from_parts(Translation3::from(self.axis.into_inner() * value), UnitQuaternion::identity())
+                }
             }
     }
 }

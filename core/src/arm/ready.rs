@@ -39,7 +39,8 @@ impl Space<'_> {
                 best = Some((depth, room, joints));
             }
         };
-        let places = || [0.10, 0.20, 0.30].into_iter().flat_map(|before| [0.12, 0.20, 0.28].map(|height| (before, height)));
+        let places =
+            || [0.10, 0.20, 0.30].into_iter().flat_map(|before| [0.12, 0.20, 0.28].map(|height| (before, height)));
         for start in self.arm.inverse(&level_tool(&entry, 0.0), &home) {
             let free = |joints: &Joints| self.is_free(joints);
             if !free(&start) {

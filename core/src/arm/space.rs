@@ -111,10 +111,8 @@ impl<'a> Space<'a> {
 
     /// The panels as boxes.
     pub fn panels(&self) -> Vec<Bounds> {
-        let bounds = |slab: &Slab| Bounds {
-            min: slab.min.map(|v| v as f32).into(),
-            max: slab.max.map(|v| v as f32).into(),
-        };
+        let bounds =
+            |slab: &Slab| Bounds { min: slab.min.map(|v| v as f32).into(), max: slab.max.map(|v| v as f32).into() };
         self.panels.iter().map(bounds).collect()
     }
 }

@@ -213,9 +213,7 @@ fn balls_cover_their_parts_and_little_more() {
                 let grown = 0.03;
                 bounds.min[a] - grown + rand::Rng::random::<f32>(&mut rng) * (bounds.size()[a] + 2.0 * grown)
             }));
-            let in_ball = |by: f64| {
-                part.balls.iter().any(|b| (b.center - p.map(f64::from)).norm() <= b.radius_m + by)
-            };
+            let in_ball = |by: f64| part.balls.iter().any(|b| (b.center - p.map(f64::from)).norm() <= b.radius_m + by);
             if part.shape.contains(p) {
                 assert!(in_ball(1e-6), "{} at {p}", part.link);
             }
@@ -336,7 +334,13 @@ fn plans_are_free_within_limits_and_the_same_every_time() {
     }
     assert_eq!(way(1).expect("a way").path, planned.path);
     let walled = goals.iter().map(|chain| vec![chain[0]]).collect::<Vec<_>>();
-    let inside_out = plan(&space, &Joints::of(&[0.0, 1.5, 0.0, 0.0, 0.0, 0.0]), &walled, PlanSettings::default(), &mut stream(1, "plan", 0));
+    let inside_out = plan(
+        &space,
+        &Joints::of(&[0.0, 1.5, 0.0, 0.0, 0.0, 0.0]),
+        &walled,
+        PlanSettings::default(),
+        &mut stream(1, "plan", 0),
+    );
     assert!(inside_out.is_none(), "a start in the table leads nowhere");
 }
 
@@ -379,7 +383,8 @@ fn the_swept_volume_holds_the_arm() {
     for joints in &follow.path {
         let poses = arm.body_poses(joints);
         for (body, part) in arm.parts() {
-            let center = part.shape.vertices.iter().map(|v| v.coords).sum::<crate::Vector>() / part.shape.vertices.len() as f32;
+            let center =
+                part.shape.vertices.iter().map(|v| v.coords).sum::<crate::Vector>() / part.shape.vertices.len() as f32;
             for vertex in &part.shape.vertices {
                 let inner = crate::Point::from(center + (vertex.coords - center) * 0.999);
                 let point = pose_of(&poses[body]) * inner;
@@ -408,18 +413,54 @@ fn bad_files_are_told_by_file_and_place() {
     let good = include_str!("../../../assets/robots/ur5_2f85.urdf");
     assert!(parse(good).is_ok());
     let cases = [
-        (r#"<box size="0.111 0.035 0.03"/>"#, r#"<mesh filename="no/such.stl"/>"#, "arm.urdf: line 44, link gripper_link: mesh `no/such.stl` is not there"),
-        (r#"<box size="0.111 0.035 0.03"/>"#, r#"<mesh filename="package://ur/no.stl"/>"#, "arm.urdf: line 44, link gripper_link: mesh"),
-        (r#"type="revolute">
-    <parent link="forearm_link"/>"#, r#"type="floating">
-    <parent link="forearm_link"/>"#, "arm.urdf: line 68, joint wrist_1_joint: is floating"),
-        (r#"<child link="wrist_1_link"/>"#, r#"<child link="wrist_7_link"/>"#, "arm.urdf: line 68, joint wrist_1_joint: its child link `wrist_7_link` is not in the file"),
-        (r#"<child link="wrist_1_link"/>"#, r#"<child link="base_link"/>"#, "arm.urdf: line 53, joint shoulder_pan_joint: is part of a loop"),
-        (r#"<child link="flange"/>"#, r#"<child link="camera"/>"#, "closes a loop: link `camera` already hangs from joint `flange_joint`"),
+        (
+            r#"<box size="0.111 0.035 0.03"/>"#,
+            r#"<mesh filename="no/such.stl"/>"#,
+            "arm.urdf: line 44, link gripper_link: mesh `no/such.stl` is not there",
+        ),
+        (
+            r#"<box size="0.111 0.035 0.03"/>"#,
+            r#"<mesh filename="package://ur/no.stl"/>"#,
+            "arm.urdf: line 44, link gripper_link: mesh",
+        ),
+        (
+            r#"type="revolute">
+    <parent link="forearm_link"/>"#,
+            r#"type="floating">
+    <parent link="forearm_link"/>"#,
+            "arm.urdf: line 68, joint wrist_1_joint: is floating",
+        ),
+        (
+            r#"<child link="wrist_1_link"/>"#,
+            r#"<child link="wrist_7_link"/>"#,
+            "arm.urdf: line 68, joint wrist_1_joint: its child link `wrist_7_link` is not in the file",
+        ),
+        (
+            r#"<child link="wrist_1_link"/>"#,
+            r#"<child link="base_link"/>"#,
+            "arm.urdf: line 53, joint shoulder_pan_joint: is part of a loop",
+        ),
+        (
+            r#"<child link="flange"/>"#,
+            r#"<child link="camera"/>"#,
+            "closes a loop: link `camera` already hangs from joint `flange_joint`",
+        ),
         (r#"<link name="tool"/>"#, r#"<link name="tol"/>"#, "its child link `tool` is not in the file"),
-        (r#"<cylinder radius="0.050" length="0.425"/>"#, r#"<cylinder radius="0.050" length="0"/>"#, "link upper_arm_link: length 0 of a collision shape"),
-        (r#"<origin xyz="0 -0.1197 0.425"/>"#, r#"<origin xyz="0 -0.1197 0"/>"#, "joint elbow_joint: turns about the same line as joint `shoulder_lift_joint`"),
-        (r#"lower="-3.141592653589793" upper="3.141592653589793""#, r#"lower="3" upper="-3""#, "joint elbow_joint: limits are the wrong way round: lower 3 is above upper -3"),
+        (
+            r#"<cylinder radius="0.050" length="0.425"/>"#,
+            r#"<cylinder radius="0.050" length="0"/>"#,
+            "link upper_arm_link: length 0 of a collision shape",
+        ),
+        (
+            r#"<origin xyz="0 -0.1197 0.425"/>"#,
+            r#"<origin xyz="0 -0.1197 0"/>"#,
+            "joint elbow_joint: turns about the same line as joint `shoulder_lift_joint`",
+        ),
+        (
+            r#"lower="-3.141592653589793" upper="3.141592653589793""#,
+            r#"lower="3" upper="-3""#,
+            "joint elbow_joint: limits are the wrong way round: lower 3 is above upper -3",
+        ),
         (r#"lower="-3.141592653589793" upper="3.141592653589793" "#, "", "joint elbow_joint: has no room to move"),
         (r#"velocity="3.141592653589793""#, r#"velocity="0""#, "joint shoulder_pan_joint: velocity limit is 0"),
         (r#"<axis xyz="0 0 1"/>"#, r#"<axis xyz="0 0 0"/>"#, "joint shoulder_pan_joint: its axis has no direction"),
@@ -430,7 +471,10 @@ fn bad_files_are_told_by_file_and_place() {
         let changed = good.replacen(from, to, 1);
         assert_ne!(changed, good, "{from}");
         let message = parse(&changed).map(|_| ()).expect_err(to).to_string();
-        assert!(message.starts_with("arm.urdf: ") && message.contains(expected) && !message.contains('\n'), "{message}");
+        assert!(
+            message.starts_with("arm.urdf: ") && message.contains(expected) && !message.contains('\n'),
+            "{message}"
+        );
     }
     let no_tool = good.replace("\"tool\"", "\"finger\"");
     let message = parse(&no_tool).map(|_| ()).expect_err("no tool").to_string();

@@ -207,7 +207,8 @@ impl<'r> Reader<'r> {
             let parallel = before.axis.cross(&(from_after.rotation * after.axis.into_inner())).norm() < 1e-6;
             let offset = before.axis.cross(&from_after.translation.vector).norm();
             if turning && parallel && offset < 1e-6 {
-                let message = format!("turns about the same line as joint `{}`: the link between has no length", before.name);
+                let message =
+                    format!("turns about the same line as joint `{}`: the link between has no length", before.name);
                 let element = self.tree.above.values().find(|joint| joint.at.name == after.name);
                 let place = element.map_or(String::new(), |joint| place("joint", &joint.at));
                 return Err(Error::input(self.path, place, message));

@@ -91,7 +91,8 @@ pub(super) mod tests {
                         .expect("a hand pose near the dome");
                     let [a, b, c] = position;
                     let place = format!("[{a:.4}, {b:.4}, {c:.4}]");
-                    writeln!(text, "    {{ position = {place}, target = {target:?}, slot = [{i}, {j}, {k}] }},").expect("text");
+                    writeln!(text, "    {{ position = {place}, target = {target:?}, slot = [{i}, {j}, {k}] }},")
+                        .expect("text");
                 }
             }
         }
@@ -130,7 +131,10 @@ pub(super) mod tests {
         let hands = array.hand_poses(&robot);
         assert_eq!(array.unreachable(&hands), [ViewId(7)]);
         array.views.iter_mut().for_each(|view| view.world_from_camera.translation.vector.z += 5.0);
-        assert!(array.unreachable(&array.hand_poses(&robot)).is_empty(), "an episode without a fitting arm still looks");
+        assert!(
+            array.unreachable(&array.hand_poses(&robot)).is_empty(),
+            "an episode without a fitting arm still looks"
+        );
     }
 
     #[test]
@@ -140,7 +144,10 @@ pub(super) mod tests {
         let space = crate::arm::Space::closed(&robot.arm, &robot.shelf);
         for pair in hands.windows(2).step_by(5) {
             let motion = robot.carry(&pair[0], &pair[1], &mut crate::rng::stream(1, "carry", 0));
-            assert_eq!((motion.at(0.0), motion.at(motion.duration_s())), (Some(pair[0].joints()), Some(pair[1].joints())));
+            assert_eq!(
+                (motion.at(0.0), motion.at(motion.duration_s())),
+                (Some(pair[0].joints()), Some(pair[1].joints()))
+            );
             for step in 0..=100 {
                 let joints = motion.at(motion.duration_s() * f64::from(step) / 100.0).expect("on the way");
                 assert!(space.room_m(&joints) > -0.004, "{:?}", space.hit(&joints));

@@ -1,13 +1,15 @@
 //! The episode as a state machine.
 
-use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds};
+use super::record::{
+    EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
+};
 use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion, Pusher};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::Grid;
+use crate::plan::{self, Action, Decision, History, Reason, Situation};
 use crate::push::ArmClearance;
 use crate::rng::stream;
-use crate::plan::{self, Action, Decision, History, Reason, Situation};
 use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::score::{Scores, object_verdicts};
 use crate::tool::{Push, Tool};
@@ -207,9 +209,10 @@ impl Episode {
 
     /// The arm's motion for a push: the decision's if it is for this push, else a new one, which the decision then keeps.
     fn motion_for(&self, arm: &ArmTool, decision: &mut Decision, push: &Push) -> Result<PushMotion> {
-        let kept = decision.motion.take().filter(|motion| {
-            arm.ready.is_some_and(|ready| motion.carries_out(&arm.arm, &ready, push))
-        });
+        let kept = decision
+            .motion
+            .take()
+            .filter(|motion| arm.ready.is_some_and(|ready| motion.carries_out(&arm.arm, &ready, push)));
         let motion = match kept {
             Some(motion) => motion,
             None => {

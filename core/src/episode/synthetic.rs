@@ -45,7 +45,14 @@ pub fn record(steps: usize) -> EpisodeRecord {
         let action = if index == 2 { Action::Push(push) } else { Action::Look { view: ViewId(17) } };
         let gains: Vec<f32> = (0..300).map(|_| rng.random_range(0.0..5000.0)).collect();
         let candidates = vec![
-            CandidateRecord { push, rejection: None, gain: Some(gains[0]), view: Some(ViewId(3)), reg: Some(-0.7), motion_s: Some(6.25) },
+            CandidateRecord {
+                push,
+                rejection: None,
+                gain: Some(gains[0]),
+                view: Some(ViewId(3)),
+                reg: Some(-0.7),
+                motion_s: Some(6.25),
+            },
             CandidateRecord {
                 push,
                 rejection: Some(Rejection::StartBlocked { at: [0.1, 0.2, 0.3] }),
@@ -94,7 +101,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
             seed: u64::MAX,
             budget: 4,
             views: "standard300".to_owned(),
-            planner: PlannerSettings { candidates: 80, gamma: 0.2 },
+            planner: PlannerSettings::default(),
             noise: None,
         },
         prior: scores(0),

@@ -37,7 +37,8 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         best_push: None,
         motion: None,
     };
-    let guard = || push_guard(history, situation.budget, situation.belief.is_complete());
+    let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
+    let guard = || push_guard(history, situation.budget, complete(), settings.quiet_steps);
     match policy {
         PolicyKind::Mem => {
             if let (true, Some(view)) = (history.just_pushed(), history.view_of_push) {
@@ -62,7 +63,8 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         }
         PolicyKind::Saturation => {
             let previous = history.best_gains.last().copied();
-            if previous.is_some_and(|previous| saturated(previous, decision.best_gain().unwrap_or(0.0))) {
+            let current = decision.best_gain().unwrap_or(0.0);
+            if previous.is_some_and(|previous| saturated(previous, current, settings.saturation)) {
                 push_at_random(&mut decision, situation, guard());
             }
         }

@@ -406,8 +406,14 @@ fn a_history_takes_down_what_was_done() {
     assert_eq!((history.actions.len(), history.used_views.len()), (1, 1));
     assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
 
-    let candidate =
-        CandidateRecord { push: push(), rejection: None, gain: Some(1.0), view: Some(ViewId(3)), reg: None, motion_s: None };
+    let candidate = CandidateRecord {
+        push: push(),
+        rejection: None,
+        gain: Some(1.0),
+        view: Some(ViewId(3)),
+        reg: None,
+        motion_s: None,
+    };
     let pushed =
         Decision { action: Action::Push(push()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
     history.record(&pushed, false);

@@ -1,10 +1,10 @@
 //! What pushes are worth: IGM and Reg of every candidate.
 
 use super::{CandidateRecord, PlannerSettings, Situation};
+use crate::arm::PushMotion;
 use crate::belief::{Belief, PushPrediction, SweptPush};
 use crate::camera::ViewId;
 use crate::gain::{GainField, RayDensity, RayGains, gain_of_views};
-use crate::arm::PushMotion;
 use crate::push::{Candidate, sample_by};
 use crate::rng::{ChaCha8Rng, stream};
 

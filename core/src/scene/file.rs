@@ -218,7 +218,10 @@ impl Scene {
             scene.robot = RobotPlacement {
                 base: robot.base.map_or(standard.base, |base| base.get_ref().map(|v| v as f32)),
                 yaw_deg: robot.yaw_deg.map_or(standard.yaw_deg, |yaw| yaw.into_inner() as f32),
-                urdf: robot.urdf.map(|file| RobotFile::read(&folder.join(file.get_ref()), file.get_ref())).transpose()?,
+                urdf: robot
+                    .urdf
+                    .map(|file| RobotFile::read(&folder.join(file.get_ref()), file.get_ref()))
+                    .transpose()?,
             };
         }
         warnings.extend(check::check(&scene, catalog, &places)?);

@@ -9,7 +9,9 @@
 mod placeable;
 
 use super::file::Places;
-use super::{Catalog, Class, ClassId, MeshShape, OBJECT_CLASS_COUNT, Object, RobotPlacement, Scene, Shelf, check, outline};
+use super::{
+    Catalog, Class, ClassId, MeshShape, OBJECT_CLASS_COUNT, Object, RobotPlacement, Scene, Shelf, check, outline,
+};
 use crate::rng::{ChaCha8Rng, stream};
 use crate::{Error, Result};
 use placeable::{FloorGrid, FloorMask};

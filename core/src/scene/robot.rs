@@ -87,9 +87,9 @@ impl RobotFile {
         let text = String::from_utf8(bytes).map_err(|_| Error::input(path, "", "not a URDF file (not UTF-8 text)"))?;
         let document = xml(&text, path)?;
         let mut meshes = BTreeMap::new();
-        let named = document.descendants().filter(|node| {
-            node.has_tag_name("mesh") && node.ancestors().any(|above| above.has_tag_name("collision"))
-        });
+        let named = document
+            .descendants()
+            .filter(|node| node.has_tag_name("mesh") && node.ancestors().any(|above| above.has_tag_name("collision")));
         for node in named {
             let Some(name) = node.attribute("filename") else { continue };
             let wrong = |message: String| Error::input(path, mesh_place(&document, &node), message);
@@ -150,13 +150,16 @@ mod tests {
     fn meshes_are_taken_along_as_hulls() {
         let folder = tempfile::tempdir().expect("tempdir");
         let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { 0.1_f32 } else { 0.0 });
-        let mut obj: String = (0..8).map(|i| corner(i).map(|v| v.to_string()).join(" ")).map(|v| format!("v {v}\n")).collect();
+        let mut obj: String =
+            (0..8).map(|i| corner(i).map(|v| v.to_string()).join(" ")).map(|v| format!("v {v}\n")).collect();
         obj += "v 0.05 0.05 0.05\nf 1 2 3\nf 5 6 9\n";
         std::fs::create_dir(folder.path().join("meshes")).expect("folder");
         std::fs::write(folder.path().join("meshes/box.obj"), obj).expect("mesh");
         let urdf = folder.path().join("arm.urdf");
         let text = |name: &str| {
-            format!("<robot>\n<link name=\"a\">\n<collision><geometry><mesh filename=\"{name}\"/></geometry></collision></link></robot>")
+            format!(
+                "<robot>\n<link name=\"a\">\n<collision><geometry><mesh filename=\"{name}\"/></geometry></collision></link></robot>"
+            )
         };
         std::fs::write(&urdf, text("package://some_arm/meshes/box.obj")).expect("urdf");
         let file = RobotFile::read(&urdf, "arm.urdf").expect("readable");

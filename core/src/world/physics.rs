@@ -304,8 +304,13 @@ impl Physics {
                 if !panel.compute_aabb().intersects(&near) {
                     continue;
                 }
-                let contact =
-                    rapier3d::parry::query::contact(part.position(), part.shape(), panel.position(), panel.shape(), 0.0);
+                let contact = rapier3d::parry::query::contact(
+                    part.position(),
+                    part.shape(),
+                    panel.position(),
+                    panel.shape(),
+                    0.0,
+                );
                 if let Ok(Some(contact)) = contact {
                     deepest = deepest.max(-contact.dist);
                 }

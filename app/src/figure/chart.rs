@@ -41,8 +41,8 @@ const TOP: f32 = 30.0;
 const BOTTOM: f32 = 36.0;
 /// Least distance of the baselines of two names.
 const PITCH: f32 = 14.0;
-/// Room for a name.
-const NAMES: f32 = 168.0;
+/// Room for a name, also in a browser's wider type.
+const NAMES: f32 = 204.0;
 
 impl Chart {
     /// The chart as a drawing of its own.

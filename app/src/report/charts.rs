@@ -8,7 +8,7 @@ use nudge_core::score::{Interval, Reliability, ReliabilityBin, mean};
 /// Resampled means behind a band: a band needs fewer than a table.
 const BAND_RESAMPLES: usize = 1000;
 /// Size of a chart, units.
-pub const SIZE: [f32; 2] = [600.0, 320.0];
+pub const SIZE: [f32; 2] = [640.0, 320.0];
 
 /// A chart with its file's name and what to say below it.
 pub struct Figure {

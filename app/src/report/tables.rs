@@ -287,5 +287,5 @@ fn across(results: &Results, one: usize, other: usize) -> String {
         }
         table.rows.push(row);
     }
-    table.html()
+    if table.rows.is_empty() { String::new() } else { table.html() }
 }

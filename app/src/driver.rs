@@ -8,6 +8,7 @@ use crate::figure::{Moment, Summary, summary};
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
+use nudge_core::cnabu;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Observer, Overwrite, StepOutcome, resume};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::{Body, Catalog, Scene};
@@ -160,17 +161,40 @@ impl Driver {
 /// person should know about the choice.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that is unknown, or asked for but not there.
+/// [`Error::Usage`] for a name that is unknown, or asked for but not there; what is wrong with the networks' weights.
 pub fn belief_update(named: Option<&str>, policy: PolicyKind) -> Result<(Arc<dyn BeliefUpdate>, Option<String>)> {
     match named.unwrap_or_else(|| policy.default_belief()) {
         "classical" => Ok((Arc::new(Classical), None)),
-        "cnabu" if named.is_none() => {
-            let note = format!("no network weights are there yet: {policy} runs on the classical belief");
-            Ok((Arc::new(Classical), Some(note)))
-        }
-        "cnabu" => Err(Error::Usage("--belief cnabu: no network weights are there yet; use classical".to_owned())),
+        "cnabu" => match (networks(), named) {
+            (Ok(update), _) => Ok((update, None)),
+            // Broken weights are an error even for who did not ask for them; that there are none is not.
+            (Err(NoNetworks::Broken(error)), _) => Err(error),
+            (Err(NoNetworks::Missing(why)), None) => {
+                Ok((Arc::new(Classical), Some(format!("{why}: {policy} runs on the classical belief"))))
+            }
+            (Err(NoNetworks::Missing(why)), Some(_)) => {
+                Err(Error::Usage(format!("--belief cnabu: {why}; use classical")))
+            }
+        },
         other => Err(Error::Usage(format!("unknown belief \"{other}\"; there are classical, cnabu"))),
     }
+}
+
+/// Why there are no networks to run on.
+enum NoNetworks {
+    /// This build has none, or no weights are there.
+    Missing(&'static str),
+    /// The weights are there but cannot be used.
+    Broken(Error),
+}
+
+/// The networks with the weights that [`cnabu::models_dir`] finds.
+fn networks() -> std::result::Result<Arc<dyn BeliefUpdate>, NoNetworks> {
+    if !cnabu::AVAILABLE {
+        return Err(NoNetworks::Missing("this build has no networks"));
+    }
+    let directory = cnabu::models_dir().ok_or(NoNetworks::Missing("no network weights are there"))?;
+    cnabu::load(&directory).map_err(NoNetworks::Broken)
 }
 
 /// Where an episode goes unless told: `out/<scene>-<policy>-<seed>`.

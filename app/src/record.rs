@@ -14,6 +14,8 @@ pub(crate) mod layout;
 pub mod paths;
 mod remarks;
 pub(crate) mod shapes;
+#[cfg(feature = "cnabu")]
+pub mod training;
 pub(crate) mod voxels;
 
 use crate::picture;

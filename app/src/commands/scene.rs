@@ -111,10 +111,12 @@ struct ThumbnailArgs {
     width: u32,
 }
 
+/// A range of floor shares.
 #[derive(Clone, Copy, Debug)]
-struct Fill([f32; 2]);
+pub(super) struct Fill(pub(super) [f32; 2]);
 
-fn parse_fill(text: &str) -> Result<Fill, String> {
+/// `0.4`, or a range, `0.30-0.45`.
+pub(super) fn parse_fill(text: &str) -> Result<Fill, String> {
     let number = |text: &str| text.trim().parse::<f32>().map_err(|_| format!("`{text}` is not a number"));
     let (low, high) = text.split_once('-').unwrap_or((text, text));
     Ok(Fill([number(low)?, number(high)?]))

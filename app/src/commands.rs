@@ -6,12 +6,16 @@ use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
 
+mod bench;
 mod calibrate;
 mod data;
 mod mesh;
 #[cfg(feature = "workbench")]
 mod open;
+mod regress;
 mod replay;
+mod report;
+mod robot;
 mod run;
 mod scene;
 #[cfg(feature = "workbench")]
@@ -37,10 +41,18 @@ enum Command {
     Shot(shot::Args),
     /// Map a scene with a policy and write the episode
     Run(run::Args),
+    /// Run policies on sets of scenes, and put shards of that together
+    Bench(bench::Args),
     /// Re-run an episode from its log and verify every step
     Replay(replay::Args),
-    /// Make, check, generate and draw scenes
+    /// Hold the scores of a small fixed bench against golden ones
+    Regress(regress::Args),
+    /// Make a page of tables and charts of a bench
+    Report(report::Args),
+    /// Make, check, generate, rescale and draw scenes
     Scene(scene::Args),
+    /// Check an arm's URDF file: what it reaches, and which views
+    Robot(robot::Args),
     /// Make training data
     Data(data::Args),
     /// Train the networks of the belief update
@@ -67,8 +79,12 @@ pub fn main() -> ExitCode {
         #[cfg(not(feature = "workbench"))]
         None => Ok(()),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Regress(args)) => regress::run(&args),
+        Some(Command::Report(args)) => report::run(&args),
         Some(Command::Scene(args)) => scene::run(&args),
+        Some(Command::Robot(args)) => robot::run(&args),
         Some(Command::Data(args)) => data::run(&args),
         Some(Command::Train(args)) => train::run(&args),
         Some(Command::Calibrate(args)) => calibrate::run(&args),

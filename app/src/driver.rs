@@ -15,7 +15,7 @@ use nudge_core::scene::{Body, Catalog, Scene};
 use nudge_core::world::TruthMap;
 use nudge_core::{Error, Result};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// File of the recording in an episode's directory.
@@ -157,6 +157,9 @@ impl Driver {
     }
 }
 
+/// The names of the belief updates.
+pub const BELIEFS: [&str; 2] = ["classical", "cnabu"];
+
 /// The belief update that a policy runs with: the one named, or the policy's own. Says in the second value what a
 /// person should know about the choice.
 ///
@@ -188,13 +191,18 @@ enum NoNetworks {
     Broken(Error),
 }
 
-/// The networks with the weights that [`cnabu::models_dir`] finds.
+/// The networks with the weights that [`cnabu::models_dir`] finds; read once in the program's life.
 fn networks() -> std::result::Result<Arc<dyn BeliefUpdate>, NoNetworks> {
+    static LOADED: OnceLock<Arc<dyn BeliefUpdate>> = OnceLock::new();
     if !cnabu::AVAILABLE {
         return Err(NoNetworks::Missing("this build has no networks"));
     }
+    if let Some(loaded) = LOADED.get() {
+        return Ok(loaded.clone());
+    }
     let directory = cnabu::models_dir().ok_or(NoNetworks::Missing("no network weights are there"))?;
-    cnabu::load(&directory).map_err(NoNetworks::Broken)
+    let update = cnabu::load(&directory).map_err(NoNetworks::Broken)?;
+    Ok(LOADED.get_or_init(|| update).clone())
 }
 
 /// Where an episode goes unless told: `out/<scene>-<policy>-<seed>`.

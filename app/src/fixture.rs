@@ -61,6 +61,7 @@ pub fn play(steps: usize) -> Played {
                         gain: feasible.then_some(900.0 - 7.0 * rank),
                         view: feasible.then_some(ViewId(rank as u16 * 3)),
                         reg: feasible.then_some(-3.0 * rank),
+                        motion_s: None,
                     }
                 })
                 .collect();
@@ -93,6 +94,8 @@ pub fn play(steps: usize) -> Played {
             objects: object_verdicts(&belief, &truth, &played.catalog),
             dropped: Vec::new(),
             displacement_m: 0.0,
+            motion_s: 0.0,
+            push: None,
             seconds: StepSeconds::default(),
         };
         played.record.steps.push(step.clone());
@@ -100,7 +103,15 @@ pub fn play(steps: usize) -> Played {
             Some((swept, prediction, pushed)) => (Some(swept), Some(prediction), Some(pushed)),
             None => (None, None, None),
         };
-        played.outcomes.push(StepOutcome { record: step, image, observation, swept, prediction, push_outcome });
+        played.outcomes.push(StepOutcome {
+            record: step,
+            image,
+            observation,
+            swept,
+            prediction,
+            push_outcome,
+            motion: None,
+        });
         played.bodies.push(world.bodies());
         played.beliefs.push(belief.clone());
         played.truths.push(truth.clone());
@@ -142,5 +153,6 @@ fn decision(views: &ViewArray, index: usize) -> Decision {
         gains,
         candidates: Vec::new(),
         best_push: None,
+        motion: None,
     }
 }

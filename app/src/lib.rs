@@ -1,9 +1,10 @@
-//! Nudge: the command line, recording to Rerun, pictures and figures.
+//! Nudge: the command line, experiments and their report, recording to Rerun, pictures and figures.
 //!
 //! [`commands`] has one thin file per subcommand; [`driver`] moves an episode, its directory and its recording one action
 //! at a time; [`record`] turns an episode's events into Rerun entities; [`picture`] draws scenes and floor plans, and
 //! [`figure`] composes them into a slide.
 
+pub mod bench;
 pub mod colors;
 pub mod commands;
 pub mod driver;
@@ -12,6 +13,8 @@ pub mod figure;
 mod fixture;
 pub mod picture;
 pub mod record;
+pub mod regress;
+pub mod report;
 pub mod verdicts;
 #[cfg(feature = "workbench")]
 pub mod workbench;

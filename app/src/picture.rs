@@ -6,6 +6,7 @@
 
 mod floor;
 mod light;
+mod robot;
 mod stage;
 
 pub use floor::{
@@ -14,6 +15,7 @@ pub use floor::{
 };
 pub use image::RgbImage;
 pub use light::{Eye, Item, Projection, render};
+pub use robot::{Placed, of_robot};
 pub use stage::{View, of_bodies, of_solid, thumbnail};
 
 use nudge_core::Result;

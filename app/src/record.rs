@@ -3,7 +3,8 @@
 //! The recorder writes step by step on the timeline `step`: 0 is the prior, `n` is the state after the `n`-th action
 //! together with the decision that led to it. A file is flushed after every step, so that a run that was killed leaves
 //! a recording that opens. The layout is inside the file. Wall-clock timelines are off, so that two runs of the same
-//! episode give recordings with the same content.
+//! episode give recordings with the same content. A second timeline, `robot`, is the robot's own clock: along it the arm
+//! moves pose by pose.
 //!
 //! Entity names are in [`paths`] and nowhere else.
 
@@ -13,15 +14,19 @@ mod floor;
 pub(crate) mod layout;
 pub mod paths;
 mod remarks;
+mod robot;
 pub(crate) mod shapes;
 #[cfg(feature = "cnabu")]
 pub mod training;
 pub(crate) mod voxels;
 
+pub(crate) use decision::mishaps;
+
 use crate::picture;
 use crate::verdicts::Judged;
+use nudge_core::arm::{ArmTool, Joints};
 use nudge_core::belief::{Belief, PushPrediction};
-use nudge_core::camera::{Image, View, ViewArray};
+use nudge_core::camera::{Image, View, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
 use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
 use nudge_core::grid::Grid;
@@ -50,6 +55,10 @@ pub struct Setting<'a> {
     pub budget: usize,
     /// Weight of the disturbance term.
     pub gamma: f32,
+    /// The arm before the shelf, where there is one to show.
+    pub arm: Option<&'a ArmTool>,
+    /// Views that its hand cannot be at.
+    pub unreachable: &'a [ViewId],
 }
 
 /// The state after a step.
@@ -80,6 +89,8 @@ pub struct Recorder {
     shown: BTreeSet<ObjectId>,
     /// The truth that was last recorded.
     truth: Option<TruthMap>,
+    /// What the robot's clock shows, seconds.
+    robot_s: f64,
 }
 
 impl Recorder {
@@ -115,6 +126,7 @@ impl Recorder {
             field: None,
             shown: BTreeSet::new(),
             truth: None,
+            robot_s: 0.0,
         }
     }
 
@@ -135,6 +147,7 @@ impl Recorder {
     /// Records a state with what led to it: without an outcome the prior. States come in the order of their steps.
     pub fn record(&mut self, setting: &Setting<'_>, state: &State<'_>, outcome: Option<&StepOutcome>) -> Result<()> {
         let nats = outcome.map_or_else(Vec::new, |outcome| self.gain_of_voxels(setting, outcome));
+        self.robot(setting, state.step, outcome)?;
         self.state(setting, state)?;
         match outcome {
             Some(outcome) => self.outcome(setting, state.belief, outcome, &nats)?,
@@ -184,6 +197,14 @@ impl Recorder {
         self.fix(paths::SHELF, &shapes::shelf_panels(setting.shelf))?;
         self.fix(paths::SHELF_EDGES, &shapes::shelf_edges(setting.shelf))?;
         self.fix(paths::CAMERA_VIEWS, &shapes::view_frusta(setting.views))?;
+        if let Some(arm) = setting.arm {
+            self.fix(paths::CAMERA_REACH, &robot::reachable(setting.views, setting.unreachable))?;
+            for (number, parts) in arm.arm.bodies.iter().enumerate() {
+                if let Some(mesh) = robot::body(parts) {
+                    self.fix(&paths::robot_body(number), &mesh)?;
+                }
+            }
+        }
         let grid = setting.shelf.grid();
         for (path, legend) in floor::legends(&grid) {
             self.fix(&format!("{path}/{}", paths::SCALE), &legend.bar)?;
@@ -203,6 +224,43 @@ impl Recorder {
             .with_markers([rerun::components::MarkerShape::Up])
             .with_marker_sizes([5.0_f32]);
         self.fix(&paths::score(paths::SCORE_PUSH), &pushes)
+    }
+
+    /// Records how the arm moved in a step: pose by pose on the robot's own clock, and on the steps' timeline where it
+    /// looked, or the end of its push.
+    fn robot(&mut self, setting: &Setting<'_>, step: usize, outcome: Option<&StepOutcome>) -> Result<()> {
+        self.stream.set_time_sequence(paths::TIMELINE, step as i64);
+        self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s);
+        let Some(arm) = setting.arm else { return Ok(()) };
+        let pose = |joints: &Joints| {
+            let transforms = robot::transforms(arm, joints);
+            transforms
+                .iter()
+                .enumerate()
+                .try_for_each(|(number, transform)| self.log(&paths::robot_body(number), transform))
+        };
+        let moved = outcome.and_then(|outcome| Some((outcome, outcome.motion.as_ref()?)));
+        let Some((outcome, motion)) = moved else {
+            if let (None, Some(ready)) = (outcome, &arm.ready) {
+                pose(ready)?;
+            }
+            return self.log(paths::ROBOT_PATH, &rerun::Clear::flat());
+        };
+        self.log(paths::ROBOT_PATH, &robot::path(arm, motion))?;
+        for (at_s, joints) in robot::frames(motion) {
+            self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + at_s);
+            pose(&joints)?;
+        }
+        // The last row of a step is the one that its timeline shows.
+        let pushes = matches!(outcome.record.action, Action::Push(_));
+        let shown_s = robot::shown_at_s(arm, motion, &outcome.record.decision, pushes);
+        if let Some(joints) = motion.at(shown_s) {
+            self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + shown_s);
+            pose(&joints)?;
+        }
+        self.robot_s += motion.duration_s();
+        self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s);
+        Ok(())
     }
 
     /// Records bodies, belief, truth, error and scores.
@@ -308,9 +366,9 @@ impl Recorder {
     }
 
     fn warn(&self, record: &StepRecord) -> Result<()> {
-        record.dropped.iter().try_for_each(|name| {
-            self.note(format!("step {}: {name} fell off the board", record.index), rerun::TextLogLevel::WARN)
-        })
+        decision::mishaps(record)
+            .into_iter()
+            .try_for_each(|words| self.note(format!("step {}: {words}", record.index), rerun::TextLogLevel::WARN))
     }
 
     fn note(&self, text: String, level: &str) -> Result<()> {
@@ -341,7 +399,8 @@ impl Recorder {
     }
 
     fn check<T>(&self, result: std::result::Result<T, impl std::fmt::Display>) -> Result<T> {
-        result.map_err(|error| Error::io(&self.file, std::io::Error::other(error.to_string())))
+        // The file is written by a thread of the SDK's, which does not tell why it ended; mostly the disk is full.
+        result.map_err(|error| Error::input(&self.file, "", format!("the recording cannot be written ({error})")))
     }
 }
 
@@ -368,6 +427,8 @@ fn setting(episode: &Episode) -> Setting<'_> {
         views: episode.views(),
         budget: record.config.budget,
         gamma: record.config.planner.gamma,
+        arm: Some(episode.arm()),
+        unreachable: episode.unreachable_views(),
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! [`model`] is what the window shows and holds every choice a person has made; [`command`] is everything that can be
 //! asked; `panels/` are functions of the model that return commands; `app` carries them out. Episodes live on worker
-//! threads (`worker`), floor maps and answers are made in the background (`jobs`), and `viewer` alone touches Rerun's
-//! viewer. `shot` renders the same window without a display.
+//! threads (`worker`), floor maps and answers are made in the background (`latest`), files are written by tasks (`tasks`),
+//! and `viewer` alone touches Rerun's viewer. `shot` renders the same window without a display.
 
 pub mod annotations;
 pub mod app;
@@ -14,7 +14,6 @@ pub mod derive;
 pub mod dialog;
 pub mod export;
 pub mod half_belief;
-pub mod jobs;
 pub mod latest;
 pub mod menu;
 pub mod model;
@@ -23,6 +22,8 @@ pub mod session;
 pub mod shot;
 pub mod space;
 pub mod space_layout;
+pub mod tasks;
+pub mod threads;
 pub mod toasts;
 pub mod viewer;
 pub mod worker;
@@ -44,6 +45,10 @@ pub fn run(options: app::Options) -> Result<(), String> {
         .with_title("Nudge")
         .with_inner_size([1440.0, 900.0])
         .with_min_inner_size([900.0, 560.0]);
-    eframe::run_native("Nudge", native, Box::new(move |cc| Ok(Box::new(app::App::new(cc, options.clone())))))
-        .map_err(|error| error.to_string())
+    let threads = options.threads.clone();
+    let closed =
+        eframe::run_native("Nudge", native, Box::new(move |cc| Ok(Box::new(app::App::new(cc, options.clone())))));
+    // Episodes still end their recordings.
+    threads.join();
+    closed.map_err(|error| error.to_string())
 }

@@ -8,36 +8,42 @@
 //!
 //! Poses are in the shelf's frame. Kinematics is in `f64`, so that forward and inverse agree to a micrometre.
 
+mod bounds;
 mod chain;
 mod clearance;
 mod closed_form;
 mod cover;
+mod description;
 mod distance;
+mod hand;
 mod joints;
 mod line;
 mod model;
 mod motion;
 mod numeric;
-mod placement;
 mod plan;
 mod pusher;
+mod reach;
 mod ready;
 mod rrt;
+mod shapes;
 mod shortcut;
 mod space;
 mod sweep;
+mod tree;
 mod urdf;
 
 pub use clearance::{Hit, Obstacle};
 pub use cover::Ball;
 pub use distance::DistanceField;
+pub use hand::{HAND_M_S, HandFault, HandPose};
 pub use joints::{Joints, MAX_JOINTS};
 pub use line::{Follow, LINE_STEP_M, SINGULARITY_MARGIN, follow_line};
 pub use model::{Arm, BodyPoses, Joint, JointKind, Part, Role};
 pub use motion::{Motion, Stop};
-pub use placement::RobotPlacement;
 pub use plan::{PlanSettings, Planned, plan};
 pub use pusher::{ArmTool, PUSH_M_S, PushMotion, Pusher, WAY_BACK_M_S, WAY_IN_M_S};
+pub use reach::{Reach, YAWS_DEG};
 pub use ready::level_tool;
 pub use space::{MAP_MARGIN_M, SHELF_MARGIN_M, Space};
 

@@ -89,15 +89,16 @@ impl Belief {
         self.occupancy_entropy(self.grid.dims[2]) + self.semantic_entropy()
     }
 
-    /// Share of floor cells whose certainty is above [`CERTAIN`].
-    pub fn certain_share(&self) -> f32 {
-        let certain = (0..self.grid.cell_count()).filter(|&cell| self.likeliest(cell).1 > CERTAIN).count();
+    /// Share of floor cells whose certainty is above `threshold`, by default [`CERTAIN`].
+    pub fn certain_share(&self, threshold: f32) -> f32 {
+        let certain = (0..self.grid.cell_count()).filter(|&cell| self.likeliest(cell).1 > threshold).count();
         certain as f32 / self.grid.cell_count() as f32
     }
 
-    /// Whether the map is complete: then the planner no longer pushes but goes on looking.
+    /// Whether the map is complete, by [`CERTAIN`] and [`COMPLETE_SHARE`]: then the planner no longer pushes but goes on
+    /// looking.
     pub fn is_complete(&self) -> bool {
-        self.certain_share() >= COMPLETE_SHARE
+        self.certain_share(CERTAIN) >= COMPLETE_SHARE
     }
 
     /// Writes a push's prediction into the belief.
@@ -263,11 +264,12 @@ mod tests {
         for cell in 0..18 {
             belief.semantics[cell][14] = 100.0;
         }
-        assert!(near(belief.certain_share(), 0.9) && !belief.is_complete());
+        assert!(near(belief.certain_share(CERTAIN), 0.9) && !belief.is_complete());
         belief.semantics[18][2] = 79.0; // 79 / 93 = 0.8495
         assert!(!belief.is_complete());
         belief.semantics[18][2] = 80.0; // 80 / 94 = 0.8511
         assert!(belief.is_complete());
+        assert!(belief.certain_share(0.852) < COMPLETE_SHARE, "a higher threshold");
     }
 
     #[test]

@@ -6,6 +6,7 @@
 
 mod noise;
 mod project;
+mod reach;
 mod render;
 mod views;
 mod visibility;

@@ -19,12 +19,15 @@ pub enum Error {
         message: String,
     },
     /// The operating system refused to read or write.
-    #[error("{}: {source}", path.display())]
+    ///
+    /// The system's words are part of this error's own line and therefore not its `source`: who prints the chain of
+    /// causes would print them twice.
+    #[error("{}: {reason}", path.display())]
     Io {
         /// The file or directory that was asked for.
         path: PathBuf,
         /// The system's own words.
-        source: std::io::Error,
+        reason: std::io::Error,
     },
     /// A value on the command line or in a call is out of its range.
     #[error("{0}")]
@@ -41,8 +44,8 @@ impl Error {
     }
 
     /// An [`Error::Io`] for `path`.
-    pub fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
-        Self::Io { path: path.as_ref().to_owned(), source }
+    pub fn io(path: impl AsRef<Path>, reason: std::io::Error) -> Self {
+        Self::Io { path: path.as_ref().to_owned(), reason }
     }
 
     /// The process's exit code: 1 for a failed check, 2 for wrong use or bad input.

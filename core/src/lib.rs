@@ -3,12 +3,13 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> tool -> world -> camera -> belief -> gain -> push -> plan -> score -> episode -> learn
+//! grid -> solid -> scene -> tool -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> score -> episode -> learn
 //! ```
 //!
 //! One frame everywhere: x right, y into the shelf (0 at its front edge), z up (0 on the board), x = 0 in the
 //! middle of the shelf; metres, right-handed. Entropy and gain are in nats.
 
+pub mod arm;
 pub mod belief;
 pub mod camera;
 pub mod cnabu;

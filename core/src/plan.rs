@@ -13,10 +13,11 @@ pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, QUIET_STEPS, SATURATION, look_or_push, push_guard, saturated};
 pub use weigh::{COARSE_VIEWS, disturbance};
 
-use crate::belief::{Belief, BeliefUpdate};
+use crate::arm::{PushMotion, Pusher};
+use crate::belief::{Belief, BeliefUpdate, CERTAIN, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::push::Rejection;
-use crate::tool::{Push, Tool};
+use crate::tool::Push;
 use serde::{Deserialize, Serialize};
 
 /// Weight of the disturbance term.
@@ -79,6 +80,9 @@ pub struct CandidateRecord {
     pub view: Option<ViewId>,
     /// `min(0, H_s(belief) - H_s(predicted))`, nats.
     pub reg: Option<f32>,
+    /// How long the arm's motion takes, in, along and back, seconds; `None` if rejected.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion_s: Option<f64>,
 }
 
 /// Everything that was weighed at one step and what was chosen.
@@ -104,6 +108,9 @@ pub struct Decision {
     /// Position of the best push in `candidates`.
     #[serde(default)]
     pub best_push: Option<usize>,
+    /// The arm's motion for the push that is the action, else for the best one; `None` where none was weighed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<PushMotion>,
 }
 
 /// What the episode remembers for the planner.
@@ -167,7 +174,9 @@ pub struct Situation<'a> {
     /// The candidate views.
     pub views: &'a ViewArray,
     /// What pushes.
-    pub tool: &'a Tool,
+    pub pusher: &'a Pusher,
+    /// Views that are not offered: the hand cannot be there.
+    pub unreachable: &'a [ViewId],
     /// What happened so far.
     pub history: &'a History,
     /// Number of actions in all.
@@ -178,6 +187,13 @@ pub struct Situation<'a> {
     pub really_look: &'a (dyn Fn(ViewId) -> Belief + Sync),
 }
 
+impl Situation<'_> {
+    /// The views that are offered, by id.
+    pub fn offered(&self) -> Vec<ViewId> {
+        self.views.views.iter().map(|view| view.id).filter(|view| !self.unreachable.contains(view)).collect()
+    }
+}
+
 /// Numbers of the planner that a user may change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -186,11 +202,26 @@ pub struct PlannerSettings {
     pub candidates: usize,
     /// Weight of the disturbance term.
     pub gamma: f32,
+    /// A floor cell whose likeliest class is more probable than this is certain.
+    pub certain: f32,
+    /// The map is complete, and nothing is pushed any more, once this share of the floor cells is certain.
+    pub complete: f32,
+    /// The first steps, in which nothing is pushed.
+    pub quiet_steps: usize,
+    /// The policy `saturation` pushes once two consecutive best gains differ by less than this share.
+    pub saturation: f32,
 }
 
 impl Default for PlannerSettings {
     fn default() -> Self {
-        Self { candidates: 80, gamma: GAMMA }
+        Self {
+            candidates: 80,
+            gamma: GAMMA,
+            certain: CERTAIN,
+            complete: COMPLETE_SHARE,
+            quiet_steps: QUIET_STEPS,
+            saturation: SATURATION,
+        }
     }
 }
 

@@ -6,15 +6,18 @@
 //! (that would pull objects over the edge), and is 50 to 150 mm long. It is feasible if the tool touches neither the
 //! shelf nor a confident voxel that is not the target's, all the way in and along the push; see [`Clearance`].
 
+mod by_arm;
 mod clearance;
 mod frontier;
 
+pub use by_arm::{AVOIDED, ArmClearance};
 pub use clearance::Clearance;
 pub use frontier::frontier;
 
+use crate::arm::{Hit, Obstacle, PushMotion, Pusher};
 use crate::belief::{Belief, SweptPush};
 use crate::grid::Voxel;
-use crate::rng::ChaCha8Rng;
+use crate::rng::{ChaCha8Rng, stream};
 use crate::tool::{Push, Tool};
 use frontier::likely_targets;
 use rand::Rng;
@@ -35,6 +38,8 @@ pub const REACH_M: f32 = 0.06;
 pub const LENGTH_M: [f32; 2] = [0.05, 0.15];
 /// At most this many frontier points are tried for each feasible candidate asked for.
 pub const DRAWS_PER_CANDIDATE: usize = 10;
+/// The same where an arm pushes: each takes longer to check, and more of them fail.
+pub const ARM_DRAWS_PER_CANDIDATE: usize = 4;
 
 /// Why a candidate is no candidate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,6 +59,81 @@ pub enum Rejection {
     },
     /// The tool would touch board, walls or ceiling.
     Shelf,
+    /// The arm does not reach, in any of its configurations.
+    Unreachable {
+        /// Which part of the push.
+        stage: Stage,
+    },
+    /// The arm reaches, but something is in its way.
+    ArmBlocked {
+        /// On which part of the push.
+        stage: Stage,
+        /// What meets what.
+        #[serde(flatten)]
+        hit: Hit,
+    },
+    /// The arm could be there, but no way from where it waits was found.
+    NoWay,
+}
+
+impl Rejection {
+    /// The reason without the place: for counting what keeps pushes from being candidates.
+    pub fn kind_words(&self) -> String {
+        match self {
+            Self::StartBlocked { .. } => "the start is blocked by what is believed to stand there".to_owned(),
+            Self::PathBlocked { .. } => "the path is blocked by what is believed to stand there".to_owned(),
+            Self::ArmBlocked { stage, hit } => {
+                let met = match &hit.obstacle {
+                    Obstacle::Map { .. } => "what is believed to stand there".to_owned(),
+                    Obstacle::Shelf { panel } => format!("the shelf's {panel}"),
+                    Obstacle::Table => "the table".to_owned(),
+                    Obstacle::Arm { link } => format!("the arm's own {link}"),
+                };
+                format!("{stage}, {} would meet {met}", hit.link)
+            }
+            other => other.to_string(),
+        }
+    }
+}
+
+/// A part of a push.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// The pose in which it starts.
+    Start,
+    /// The way to the start.
+    WayIn,
+    /// The push itself.
+    Push,
+}
+
+impl std::fmt::Display for Stage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Start => "at the start",
+            Self::WayIn => "on the way in",
+            Self::Push => "along the push",
+        })
+    }
+}
+
+impl std::fmt::Display for Rejection {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoTarget => write!(f, "nothing likely to push is near"),
+            Self::StartBlocked { at: [x, y, z] } => {
+                write!(f, "the start is blocked by what is believed to stand at ({x:.3}, {y:.3}, {z:.3})")
+            }
+            Self::PathBlocked { at: [x, y, z] } => {
+                write!(f, "the path is blocked by what is believed to stand at ({x:.3}, {y:.3}, {z:.3})")
+            }
+            Self::Shelf => write!(f, "the tool would touch the shelf"),
+            Self::Unreachable { stage } => write!(f, "out of the arm's reach {stage}"),
+            Self::ArmBlocked { stage, hit } => write!(f, "{stage}, {hit}"),
+            Self::NoWay => write!(f, "no free way to the start was found"),
+        }
+    }
 }
 
 /// A sampled push with where it came from and why it was rejected, if it was.
@@ -65,6 +145,13 @@ pub struct Candidate {
     pub swept: SweptPush,
     /// `None` for a feasible candidate.
     pub rejection: Option<Rejection>,
+    /// The arm's motion for a feasible candidate, when an arm pushes.
+    pub motion: Option<PushMotion>,
+}
+
+/// Draws candidates for a tool that needs no arm; as [`sample_by`].
+pub fn sample(belief: &Belief, tool: &Tool, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
+    sample_checked(belief, &Check::Free { tool, clearance: Clearance::new(belief) }, count, rng)
 }
 
 /// Draws candidates until `count` of them are feasible, and returns all of them, rejected ones too, in the order drawn.
@@ -72,27 +159,65 @@ pub struct Candidate {
 /// Frontier points are drawn without replacement. Drawing ends early when there are no more of them or after
 /// [`DRAWS_PER_CANDIDATE`] times `count`, so that there may be fewer feasible candidates than asked for, or none. The
 /// result depends on the belief and on the stream alone, not on the number of threads.
-pub fn sample(belief: &Belief, tool: &Tool, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
+pub fn sample_by(belief: &Belief, pusher: &Pusher, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
+    match pusher {
+        Pusher::Free(tool) => sample(belief, tool, count, rng),
+        Pusher::Arm(arm) => {
+            let check = Check::Arm {
+                // What a rejected candidate would have swept is shown with the free tool's shape.
+                tool: Tool::standard(),
+                arm: ArmClearance::new(arm, belief),
+                seed: rng.random(),
+            };
+            sample_checked(belief, &check, count, rng)
+        }
+    }
+}
+
+/// How candidates are checked.
+enum Check<'a> {
+    Free { tool: &'a Tool, clearance: Clearance },
+    Arm { tool: Tool, arm: ArmClearance<'a>, seed: u64 },
+}
+
+impl Check<'_> {
+    /// How many frontier points are tried for each feasible candidate asked for.
+    fn draws_per_candidate(&self) -> usize {
+        match self {
+            Self::Free { .. } => DRAWS_PER_CANDIDATE,
+            Self::Arm { .. } => ARM_DRAWS_PER_CANDIDATE,
+        }
+    }
+
+    /// The tool whose shape a rejected candidate is shown with.
+    fn tool(&self) -> &Tool {
+        match self {
+            Self::Free { tool, .. } => tool,
+            Self::Arm { tool, .. } => tool,
+        }
+    }
+}
+
+fn sample_checked(belief: &Belief, check: &Check<'_>, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
     /// Draws that are checked together; fixed, so that it never matters who checks them.
     const BATCH: usize = 32;
-    let clearance = Clearance::new(belief);
     let mut points = frontier(belief);
-    let draws = points.len().min(count * DRAWS_PER_CANDIDATE);
+    let draws = points.len().min(count * check.draws_per_candidate());
     let mut candidates = Vec::new();
     let mut feasible = 0;
     for first in (0..draws).step_by(BATCH) {
         if feasible == count {
             break;
         }
-        let drawn: Vec<(Voxel, Option<Push>)> = (first..draws.min(first + BATCH))
+        let drawn: Vec<(u64, Voxel, Option<Push>)> = (first..draws.min(first + BATCH))
             .map(|i| {
                 let j = rng.random_range(i..points.len());
                 points.swap(i, j);
-                (points[i], draw_push(belief, points[i], rng))
+                (i as u64, points[i], draw_push(belief, points[i], rng))
             })
             .collect();
         let checked: Vec<Candidate> =
-            drawn.into_par_iter().map(|(point, push)| candidate(belief, tool, &clearance, point, push)).collect();
+            drawn.into_par_iter().map(|(number, point, push)| candidate(belief, check, number, point, push)).collect();
         for candidate in checked {
             if feasible < count {
                 feasible += usize::from(candidate.rejection.is_none());
@@ -120,15 +245,30 @@ fn draw_push(belief: &Belief, frontier: Voxel, rng: &mut ChaCha8Rng) -> Option<P
 }
 
 /// Checks a drawn push. One without a target is kept as the straight push that it would have been.
-fn candidate(belief: &Belief, tool: &Tool, clearance: &Clearance, frontier: Voxel, push: Option<Push>) -> Candidate {
+fn candidate(belief: &Belief, check: &Check<'_>, number: u64, frontier: Voxel, push: Option<Push>) -> Candidate {
     let aimless = Push { start: start_of(belief, frontier), direction_deg: 90.0, length_m: LENGTH_M[0] };
     let straight = push.unwrap_or(aimless);
-    let swept = tool.swept_volume(&straight, &belief.grid);
-    let rejection = match push {
-        None => Some(Rejection::NoTarget),
-        Some(push) => clearance.check(tool, &push, &swept, &clearance.target(frontier)),
+    let of = |swept, rejection, motion| Candidate {
+        frontier,
+        swept: SweptPush { push: straight, swept },
+        rejection,
+        motion,
     };
-    Candidate { frontier, swept: SweptPush { push: straight, swept }, rejection }
+    match (check, push) {
+        (check, None) => of(check.tool().swept_volume(&straight, &belief.grid), Some(Rejection::NoTarget), None),
+        (Check::Free { tool, clearance }, Some(push)) => {
+            let swept = tool.swept_volume(&push, &belief.grid);
+            let rejection = clearance.check(tool, &push, &swept, &clearance.target(frontier));
+            of(swept, rejection, None)
+        }
+        (Check::Arm { tool, arm, seed }, Some(push)) => {
+            let mut rng = stream(*seed, "arm", number);
+            match arm.motion(&push, &arm.target(frontier), &mut rng) {
+                Ok(motion) => of(motion.swept_volume(arm.arm(), &belief.grid), None, Some(motion)),
+                Err(rejection) => of(tool.swept_volume(&push, &belief.grid), Some(rejection), None),
+            }
+        }
+    }
 }
 
 #[cfg(test)]

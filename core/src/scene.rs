@@ -11,6 +11,8 @@ mod generate;
 mod mesh;
 pub mod outline;
 mod overlap;
+mod rescale;
+pub(crate) mod robot;
 mod shape;
 
 #[cfg(test)]
@@ -21,8 +23,11 @@ pub use catalog::{BACKGROUND, Background, CLASS_COUNT, Catalog, Class, ClassId, 
 pub use check::{MAX_OBJECTS, MAX_VOXELS, Problem};
 pub use file::FORMAT;
 pub use generate::{GenerateConfig, generate};
+pub(crate) use mesh::read_mesh_points;
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
+pub use rescale::rescale;
+pub use robot::{RobotFile, RobotPlacement};
 pub use shape::Shape;
 
 use crate::grid::Grid;
@@ -53,6 +58,9 @@ pub struct Scene {
     /// Shapes that replace a class's catalogue shape.
     #[serde(default)]
     pub meshes: BTreeMap<String, MeshShape>,
+    /// The arm before the shelf.
+    #[serde(default)]
+    pub robot: RobotPlacement,
 }
 
 /// One placed object.

@@ -2,14 +2,17 @@
 //!
 //! Everything is counted in the scored volume, the grid below [`SCORED_HEIGHT_M`], so that the empty air above does not
 //! flatter. [`Scores::of`] judges one belief; a [`Tally`] keeps the counts behind the scores, and tallies merged over a
-//! set of scenes give the set's scores from one confusion matrix. [`object_verdicts`] says what became of each object.
+//! set of scenes give the set's scores from one confusion matrix. [`object_verdicts`] says what became of each object;
+//! [`Interval`] is a mean over scenes with its confidence interval.
 
 mod confusion;
+mod interval;
 mod objects;
 mod reliability;
 mod tally;
 
 pub use confusion::Confusion;
+pub use interval::{Interval, RESAMPLES, deviation, mean};
 pub use objects::{SPECK_M2, object_verdicts};
 pub use reliability::{BIN_COUNT, Reliability, ReliabilityBin};
 pub use tally::Tally;

@@ -1,10 +1,12 @@
 //! The simulated scene (rapier3d): bodies settle, a push is executed by the tool as a kinematic body, drops are
 //! detected. Deterministic: the same scene and the same pushes give the same poses, bit for bit, on one machine.
 
+mod arm;
 mod hull;
 mod physics;
 mod truth;
 
+pub use arm::LinkContact;
 pub use truth::TruthMap;
 
 use crate::scene::{Body, ObjectId, Shelf};
@@ -50,7 +52,7 @@ pub struct World {
 }
 
 /// What a push did.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PushOutcome {
     /// How far each object's origin moved, metres, in the order of the bodies that the world was made of; for a drop
     /// to where it was when it had fallen past the board, 0 for objects dropped earlier.
@@ -63,6 +65,14 @@ pub struct PushOutcome {
     pub stalled: bool,
     /// How far the tip really moved along the push, metres.
     pub pushed_m: f32,
+    /// Objects that a link of the arm touched, which only the gripper should; each once per link.
+    pub link_contacts: Vec<LinkContact>,
+    /// Objects that the arm pressed against a wall of the shelf.
+    pub against_wall: Vec<ObjectId>,
+    /// How deep the arm got into a panel of the shelf at most, metres.
+    pub arm_in_shelf_m: f32,
+    /// How long the arm moved, seconds.
+    pub arm_s: f32,
 }
 
 /// What became of the tool's way along one straight leg.
@@ -148,6 +158,7 @@ impl World {
             duration_s: (self.physics.steps() - steps_before) as f32 * physics::TIME_STEP_S,
             stalled,
             pushed_m,
+            ..PushOutcome::default()
         }
     }
 

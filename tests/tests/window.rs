@@ -1,90 +1,62 @@
 //! The real window: the binary under a virtual display, the pictures of every layout, the exported recording in the
-//! stock viewer. They need software Vulkan (Debian's mesa-vulkan-drivers) and Xvfb, which `make test` installs.
+//! stock viewer. They need software Vulkan (Debian's mesa-vulkan-drivers) and Xvfb, which `make test-window` installs.
 
 use nudge_tests::{nudge_bin, nudge_ok, root, text, venv_tool};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 const SCENE: &str = "scenes/demo/behind-the-boxes.toml";
+/// Share of a picture's pixels that may look other than they did.
+const TOLERANCE: f64 = 0.02;
+/// How much a colour may differ, of 255, before its pixel looks other.
+const FAINT: u8 = 24;
 
-/// An episode to look at, made once for all tests.
-fn episode(policy: &str) -> PathBuf {
-    let out = root().join("target-screenshots").join(policy);
-    let out = std::env::temp_dir().join(out.file_name().expect("name"));
-    let out = out.with_file_name(format!("nudge-window-test-{}-{policy}", std::process::id()));
-    if !out.join("summary.png").exists() {
-        let args =
-            ["run", SCENE, "--belief", "classical", "--budget", "10", "--seed", "1", "--policy", policy, "--out"];
-        nudge_ok(&[&args[..], &[out.to_str().expect("utf-8")]].concat());
-    }
-    out
+/// Episodes of two policies to look at, made once for all tests of this process.
+static EPISODES: LazyLock<(tempfile::TempDir, [PathBuf; 2])> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("folder");
+    let episodes = ["mem", "random"].map(|policy| {
+        let out = folder.path().join(policy);
+        let path = out.to_str().expect("utf-8");
+        let args = ["run", SCENE, "--belief", "classical", "--budget", "10", "--seed", "1", "--candidates", "30"];
+        nudge_ok(&[&args[..], &["--policy", policy, "--out", path]].concat());
+        out
+    });
+    (folder, episodes)
+});
+
+/// A socket of the internet's protocols that a process holds.
+#[derive(Debug, PartialEq)]
+struct Socket {
+    protocol: &'static str,
+    /// Address and port in hexadecimal, as the kernel lists them: `0100007F:2694` is 127.0.0.1:9876.
+    local: String,
+    listens: bool,
 }
 
-/// Inodes of the sockets that a process listens on or has bound for UDP.
-fn open_ports(process: u32) -> Vec<String> {
-    let mut own = Vec::new();
-    for entry in std::fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten() {
-        if let Ok(target) = std::fs::read_link(entry.path()) {
-            let target = target.to_string_lossy().into_owned();
-            if let Some(inode) = target.strip_prefix("socket:[").and_then(|rest| rest.strip_suffix(']')) {
-                own.push(inode.to_owned());
-            }
-        }
-    }
+/// The sockets of a process.
+fn sockets(process: u32) -> Vec<Socket> {
+    let links = std::fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
+    let own: Vec<String> = links
+        .filter_map(|entry| {
+            let target = std::fs::read_link(entry.path()).ok()?.to_string_lossy().into_owned();
+            Some(target.strip_prefix("socket:[")?.strip_suffix(']')?.to_owned())
+        })
+        .collect();
     let mut open = Vec::new();
-    for table in ["tcp", "tcp6", "udp", "udp6"] {
-        let content = std::fs::read_to_string(format!("/proc/net/{table}")).unwrap_or_default();
-        for line in content.lines().skip(1) {
+    for protocol in ["tcp", "tcp6", "udp", "udp6"] {
+        let table = std::fs::read_to_string(format!("/proc/{process}/net/{protocol}")).unwrap_or_default();
+        for line in table.lines().skip(1) {
             let fields: Vec<&str> = line.split_whitespace().collect();
-            let listens = table.starts_with("udp") || fields[3] == "0A";
-            if listens && own.iter().any(|inode| inode == fields[9]) {
-                open.push(format!("{table} {}", fields[1]));
+            if own.iter().any(|inode| inode == fields[9]) {
+                let listens = protocol.starts_with("udp") || fields[3] == "0A";
+                open.push(Socket { protocol, local: fields[1].to_owned(), listens });
             }
         }
     }
     open
-}
-
-#[test]
-fn the_real_window_opens_steps_and_listens_nowhere() {
-    let dir = tempfile::tempdir().expect("folder");
-    let picture = dir.path().join("window.png");
-    let mut child = Command::new("xvfb-run")
-        .args(["-a", "-s", "-screen 0 1600x1000x24"])
-        .arg(nudge_bin())
-        .args(["open", SCENE, "--steps", "2", "--out"])
-        .arg(dir.path().join("out"))
-        .arg("--picture")
-        .arg(&picture)
-        .current_dir(root())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("xvfb-run starts; make test installs it");
-    let started = Instant::now();
-    let mut looked = 0;
-    let status = loop {
-        if let Some(status) = child.try_wait().expect("waited") {
-            break status;
-        }
-        for window in windows_below(child.id()) {
-            assert_eq!(open_ports(window), Vec::<String>::new());
-            looked += 1;
-        }
-        assert!(started.elapsed() < Duration::from_secs(240), "the window did not end by itself");
-        std::thread::sleep(Duration::from_millis(100));
-    };
-    let output = child.wait_with_output().expect("output");
-    assert!(status.success(), "{status}: {}", text(&output.stderr));
-    assert!(looked > 5, "the window was there to be looked at");
-    let shown = image::open(&picture).expect("a picture").into_rgb8();
-    assert!(shown.width() >= 1000 && shown.height() >= 600);
-    let first = *shown.get_pixel(0, 0);
-    assert!(shown.pixels().filter(|pixel| **pixel != first).count() > 50_000, "the window is empty");
-    let episode = std::fs::read_dir(dir.path().join("out")).expect("out").next().expect("an episode").expect("entry");
-    let record = std::fs::read_to_string(episode.path().join("episode.json")).expect("episode.json");
-    assert_eq!(record.matches("\"index\"").count(), 2);
 }
 
 /// Processes named nudge below another.
@@ -110,51 +82,153 @@ fn windows_below(parent: u32) -> Vec<u32> {
     rows.iter().filter(|(pid, _, name)| name == "nudge" && below(*pid)).map(|(pid, ..)| *pid).collect()
 }
 
-/// Share of the pixels that differ by more than a little.
+/// Runs `nudge` with arguments under a virtual display until it ends by itself; `look` is shown the window's process
+/// every now and then. Returns how it ended and what it said on standard error.
+fn under_xvfb(args: &[&str], mut look: impl FnMut(u32)) -> (ExitStatus, String) {
+    let mut child: Child = Command::new("xvfb-run")
+        .args(["-a", "-s", "-screen 0 1600x1000x24"])
+        .arg(nudge_bin())
+        .args(args)
+        .current_dir(root())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("xvfb-run starts; make test-window installs it");
+    let mut stderr = child.stderr.take().expect("piped");
+    let said = std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        stderr.read_to_end(&mut bytes).map(|_| text(&bytes)).unwrap_or_default()
+    });
+    let started = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().expect("waited") {
+            break status;
+        }
+        windows_below(child.id()).into_iter().for_each(&mut look);
+        if started.elapsed() > Duration::from_secs(300) {
+            windows_below(child.id()).into_iter().for_each(|window| {
+                let _ = Command::new("kill").arg(window.to_string()).status();
+            });
+            panic!("the window did not end by itself");
+        }
+        std::thread::sleep(Duration::from_millis(100));
+    };
+    (status, said.join().expect("read"))
+}
+
+/// Asserts that a picture of the window shows something all over.
+fn assert_drawn(picture: &Path) {
+    let shown = image::open(picture).expect("a picture").into_rgb8();
+    assert!(shown.width() >= 1000 && shown.height() >= 600);
+    let first = *shown.get_pixel(0, 0);
+    assert!(shown.pixels().filter(|pixel| **pixel != first).count() > 50_000, "the window is empty");
+}
+
+#[test]
+fn the_real_window_opens_steps_and_has_no_socket() {
+    let dir = tempfile::tempdir().expect("folder");
+    let (picture, out) = (dir.path().join("window.png"), dir.path().join("out"));
+    let args = ["open", SCENE, "--steps", "2", "--out", out.to_str().expect("utf-8"), "--picture"];
+    let mut looked = 0;
+    let (status, said) = under_xvfb(&[&args[..], &[picture.to_str().expect("utf-8")]].concat(), |window| {
+        assert_eq!(sockets(window), [], "no port, and no network at all");
+        looked += 1;
+    });
+    assert!(status.success(), "{status}: {said}");
+    assert!(looked > 5, "the window was there to be looked at");
+    assert_drawn(&picture);
+    let episode = std::fs::read_dir(&out).expect("out").next().expect("an episode").expect("entry").path();
+    let record = std::fs::read_to_string(episode.join("episode.json")).expect("episode.json");
+    assert_eq!(record.matches("\"index\"").count(), 2);
+    assert!(episode.join("summary.png").exists(), "the recording was ended before the program was gone");
+}
+
+#[test]
+fn it_serves_only_when_asked_and_only_this_machine() {
+    let dir = tempfile::tempdir().expect("folder");
+    let (picture, out) = (dir.path().join("window.png"), dir.path().join("out"));
+    // A port that was free a moment ago.
+    let port =
+        std::net::TcpListener::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a port").port();
+    let (port_text, out_text) = (port.to_string(), out.to_str().expect("utf-8").to_owned());
+    let args = ["open", SCENE, "--serve", &port_text, "--out", &out_text, "--picture"];
+    let mut served = 0;
+    let (status, said) = under_xvfb(&[&args[..], &[picture.to_str().expect("utf-8")]].concat(), |window| {
+        let listening: Vec<Socket> = sockets(window).into_iter().filter(|socket| socket.listens).collect();
+        if !listening.is_empty() {
+            assert_eq!(listening.len(), 1, "{listening:?}");
+            assert_eq!((listening[0].protocol, &*listening[0].local), ("tcp", &*format!("0100007F:{port:04X}")));
+            assert!(std::net::TcpStream::connect(("127.0.0.1", port)).is_ok());
+            served += 1;
+        }
+    });
+    assert!(status.success(), "{status}: {said}");
+    assert!(served > 0, "nothing was served");
+    // A port that is taken is one clear line.
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = taken.local_addr().expect("address").port().to_string();
+    let line = nudge_tests::nudge_fails(2, &["open", SCENE, "--serve", &port]);
+    assert!(line.contains("--serve") && line.contains(&port), "{line}");
+}
+
+/// Share of the pixels that look other.
 fn difference(a: &Path, b: &Path) -> f64 {
     let (a, b) = (image::open(a).expect("picture").into_rgb8(), image::open(b).expect("golden picture").into_rgb8());
     if a.dimensions() != b.dimensions() {
         return 1.0;
     }
-    let far = a.pixels().zip(b.pixels()).filter(|(a, b)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 24)).count();
-    far as f64 / f64::from(a.width() * a.height())
+    let far = a.pixels().zip(b.pixels()).filter(|(a, b)| a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > FAINT));
+    far.count() as f64 / f64::from(a.width() * a.height())
 }
 
 #[test]
 fn every_layout_looks_as_it_did() {
-    let (one, two) = (episode("mem"), episode("random"));
+    let [one, two] = &EPISODES.1;
     let dir = tempfile::tempdir().expect("folder");
+    let drawn = dir.path().join("workbench.png");
+    let path = |path: &Path| path.to_str().expect("utf-8").to_owned();
+    let (one, two, out) = (path(one), path(two), path(&drawn));
+    nudge_ok(&["shot", &one, "--with", &two, "--layout", "all", "--size", "1440x900", "--out", &out]);
     let mut changed = Vec::new();
     for layout in ["episode", "why", "gains", "push", "compare", "author"] {
-        let file = format!("{layout}.png");
+        let file = format!("workbench-{layout}.png");
         let (new, golden) = (dir.path().join(&file), root().join("screenshots").join(&file));
-        let opened = if layout == "author" { root().join(SCENE) } else { one.clone() };
-        let mut args = vec!["shot", opened.to_str().expect("utf-8"), "--layout", layout, "--size", "1440x900", "--out"];
-        args.push(new.to_str().expect("utf-8"));
-        if layout == "compare" {
-            args.extend(["--with", two.to_str().expect("utf-8")]);
-        }
-        nudge_ok(&args);
         if std::env::var_os("NUDGE_BLESS").is_some() {
             std::fs::copy(&new, &golden).expect("blessed");
         }
         let share = difference(&new, &golden);
-        if share > 0.02 {
-            changed.push(format!("{layout}: {:.1} % of the pixels", 100.0 * share));
+        println!("{layout}: {:.2} % of the pixels differ", 100.0 * share);
+        if share > TOLERANCE {
+            let kept = std::env::temp_dir().join(&file);
+            std::fs::copy(&new, &kept).expect("kept");
+            changed.push(format!("{layout}: {:.1} % of the pixels, see {}", 100.0 * share, kept.display()));
         }
     }
-    assert!(changed.is_empty(), "run with NUDGE_BLESS=1 and look at screenshots/: {changed:?}");
+    assert!(changed.is_empty(), "if that is as it should be, bless with NUDGE_BLESS=1 and look: {changed:#?}");
 }
 
 #[test]
-fn the_stock_viewer_shows_the_recording() {
+fn the_stock_viewer_verifies_and_shows_an_export() {
     let Some(rerun) = venv_tool("rerun") else { return };
-    let recording = episode("mem").join("episode.rrd");
     let dir = tempfile::tempdir().expect("folder");
+    let export = dir.path().join("export");
+    let session = export_of(&EPISODES.1[0], &export);
+    let recording = export.join("episode.rrd");
+    let alone = dir.path().join("alone.rrd");
+    nudge::workbench::export::write_recording(&session, &alone, &|_| true).expect("written");
+    for recording in [&recording, &alone] {
+        let verified = Command::new(&rerun).args(["rrd", "verify"]).arg(recording).output().expect("rerun");
+        assert!(verified.status.success(), "{}", text(&verified.stderr));
+        let printed = Command::new(&rerun).args(["rrd", "print", "-v"]).arg(recording).output().expect("rerun");
+        let printed = text(&printed.stdout);
+        for entity in ["/belief/occupancy", "/scores/", "/note", "blueprint"] {
+            assert!(printed.contains(entity), "{entity} is not in {}", recording.display());
+        }
+    }
     let picture = dir.path().join("stock.png");
     let output = Command::new(rerun)
         .args(["--port", "auto"])
-        .arg(&recording)
+        .arg(&alone)
         .args(["--headless", "--window-size", "1600x1000", "--screenshot-to"])
         .arg(&picture)
         .env("XDG_RUNTIME_DIR", dir.path())
@@ -162,6 +236,30 @@ fn the_stock_viewer_shows_the_recording() {
         .expect("rerun");
     assert!(output.status.success(), "{}", text(&output.stderr));
     let shown = image::open(&picture).expect("a picture").into_rgb8();
-    let first = *shown.get_pixel(800, 500);
-    assert!(shown.pixels().filter(|pixel| **pixel != first).count() > 100_000, "the recording shows nothing");
+    let ground = *shown.get_pixel(800, 500);
+    assert!(shown.pixels().filter(|pixel| **pixel != ground).count() > 100_000, "the recording shows nothing");
+}
+
+/// Opens an episode in a window without a graphics driver, writes a note and a verdict on it, and exports it.
+fn export_of(episode: &Path, into: &Path) -> nudge::workbench::session::Session {
+    use nudge::workbench::app::{App, Options};
+    use nudge::workbench::command::Command as Ask;
+    let options = Options { look_only: true, ..Options::default() };
+    let mut harness =
+        egui_kittest::Harness::builder().build_eframe(move |cc| App::without_viewer(&cc.egui_ctx, options.clone()));
+    harness.state_mut().ask(Ask::Open(episode.to_owned()));
+    let started = Instant::now();
+    while harness.state().is_busy() || harness.state().model.sessions.is_empty() {
+        harness.step();
+        assert!(started.elapsed() < Duration::from_secs(300), "it never opened");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let last = harness.state().model.session().expect("open").steps();
+    let object = harness.state().model.session().expect("open").record.steps[last - 1].objects[0].clone();
+    harness.state_mut().ask(Ask::Note(last, "the stock viewer shows this".to_owned()));
+    let name = nudge::verdicts::object_name(&object);
+    harness.state_mut().ask(Ask::Overrule(last, name, Some(nudge_core::score::Verdict::Misclassified)));
+    let session = harness.state().model.session().expect("open").clone();
+    nudge::workbench::export::write_episode(&session, into, &|_| true).expect("exported");
+    session
 }

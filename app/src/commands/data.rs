@@ -2,12 +2,13 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
+use nudge_core::arm::{ArmTool, Pusher};
 use nudge_core::camera::ViewArray;
 use nudge_core::learn::{Card, Dataset, Job, Kind, MapSample, Progress, PushSample, Recipe, Sample, make};
 use nudge_core::scene::{Catalog, GenerateConfig};
 use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Without a terminal, a line of progress is printed this often.
@@ -77,9 +78,15 @@ fn make_data<S: Sample>(args: &MakeArgs, kind: Kind) -> anyhow::Result<()> {
     if !(0.0..=1.0).contains(&args.noise) {
         return Err(Error::Usage(format!("--noise {}: must be a share between 0 and 1", args.noise)).into());
     }
+    let scenes = GenerateConfig { fill: args.fill.0, rho: args.rho, ..GenerateConfig::default() };
+    let pusher = match kind {
+        Kind::Maps => Pusher::default(),
+        Kind::Pushes => Pusher::Arm(Arc::new(ArmTool::standard(scenes.shelf))),
+    };
     let recipe = Recipe {
         catalog: Catalog::standard(),
-        scenes: GenerateConfig { fill: args.fill.0, rho: args.rho, ..GenerateConfig::default() },
+        scenes,
+        pusher,
         views: ViewArray::named(&args.views)?,
         noise_share: args.noise,
     };

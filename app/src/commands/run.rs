@@ -1,6 +1,7 @@
 //! `nudge run`: map a scene with a policy and write the episode.
 
 use crate::driver::{Driver, belief_update, default_out};
+use crate::record::mishaps;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
@@ -83,6 +84,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Driver::start(scene, catalog, config, update, &out, overwrite)?
     };
 
+    if let Some(why) = driver.episode().why_no_push() {
+        super::warn(&why);
+    }
     if !args.json {
         print_header(driver.episode().record());
         driver.episode().record().steps.iter().for_each(|step| print_step(step, args.budget));
@@ -172,8 +176,8 @@ fn print_step(step: &StepRecord, budget: usize) {
         Action::Push(_) => Some(step.decision.igm),
     };
     let mut action = action_words(step);
-    if !step.dropped.is_empty() {
-        action += &format!(", dropped {}", step.dropped.join(", "));
+    for mishap in mishaps(step) {
+        action += &format!(", {mishap}");
     }
     print_row(&format!("{}/{budget}", step.index), &action, gain, &step.scores, Some(step.seconds.total()));
 }
@@ -228,6 +232,7 @@ fn print_summary(record: &EpisodeRecord, out: &std::path::Path) {
         count(Verdict::Hallucinated)
     );
     println!("  moved, dropped       {displaced:.2} m, {dropped}");
+    println!("  the arm moved        {:.0} s of its own time", seconds(|step| step.motion_s));
     println!(
         "  time                 {:.1} s: decide {:.1}, act {:.1}, update {:.1}, record {:.1}",
         seconds(|step| step.seconds.total()),

@@ -1,20 +1,22 @@
-//! `nudge scene`: make, check, generate and draw scene files.
+//! `nudge scene`: make, check, generate, rescale and draw scene files.
 
 use super::{print, to_json, warn};
-use crate::picture::{self, View};
 use indicatif::{ProgressBar, ProgressStyle};
+use nudge_core::Error;
+use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::files::write_atomically;
-use nudge_core::scene::{Catalog, ClassId, GenerateConfig, Scene, Shelf, generate};
-use nudge_core::{Error, rng};
-use rayon::prelude::*;
+use nudge_core::scene::{Catalog, Scene};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Draws of a scene until one hides enough objects.
-const MAX_DRAWS: usize = 1000;
+mod generate;
+mod rescale;
+mod thumbnail;
 
-/// Make, check, generate and draw scene files.
+pub(super) use generate::{Fill, parse_fill};
+
+/// Make, check, generate, rescale and draw scene files.
 #[derive(clap::Args, Debug)]
 pub struct Args {
     #[command(subcommand)]
@@ -25,8 +27,9 @@ pub struct Args {
 enum Command {
     New(NewArgs),
     Check(CheckArgs),
-    Generate(GenerateArgs),
-    Thumbnail(ThumbnailArgs),
+    Generate(generate::Args),
+    Rescale(rescale::Args),
+    Thumbnail(thumbnail::Args),
 }
 
 /// Write a scene to start from: a few objects, and every key explained
@@ -56,72 +59,6 @@ struct CheckArgs {
     json: bool,
 }
 
-/// Generate random scenes as DIR/000.toml, 001.toml, ...
-#[derive(clap::Args, Debug)]
-struct GenerateArgs {
-    /// Number of scenes
-    #[arg(long, default_value_t = 1)]
-    count: usize,
-    /// Share of the floor that objects cover: 0.4, or a range that each scene draws from, 0.30-0.45
-    #[arg(long, default_value = "0.30-0.45", value_parser = parse_fill)]
-    fill: Fill,
-    /// Regularity: 0 places freely, 1 lines objects up behind each other
-    #[arg(long, default_value_t = 0.0)]
-    rho: f32,
-    /// Seed of every random choice
-    #[arg(long, default_value_t = 0)]
-    seed: u64,
-    /// Directory to write to
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-    /// Classes to place [default: all]
-    #[arg(long, value_delimiter = ',', value_name = "CLASS,...")]
-    classes: Vec<String>,
-    /// Shelf interior: width, depth and height in metres [default: 0.8,0.4,0.4]
-    #[arg(long, value_delimiter = ',', num_args = 1, value_name = "W,D,H")]
-    shelf: Vec<f32>,
-    /// Keep the objects, meshes and shelf of this scene, and generate around them
-    #[arg(long, value_name = "FILE", conflicts_with = "shelf")]
-    around: Option<PathBuf>,
-    /// Only scenes where at least so many objects are unseen from all 300 views
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    hidden: usize,
-    /// Overwrite files that are there
-    #[arg(long)]
-    force: bool,
-    /// Print one JSON document
-    #[arg(long)]
-    json: bool,
-}
-
-/// Draw a picture of each scene
-#[derive(clap::Args, Debug)]
-struct ThumbnailArgs {
-    /// Scene files
-    #[arg(required = true, value_name = "FILE")]
-    files: Vec<PathBuf>,
-    /// The picture of a single scene [default: beside each scene, with .png for .toml]
-    #[arg(long, value_name = "PNG")]
-    out: Option<PathBuf>,
-    /// Straight from above instead of from the front
-    #[arg(long)]
-    above: bool,
-    /// Width of the picture, pixels
-    #[arg(long, default_value_t = 640, value_parser = clap::value_parser!(u32).range(16..=8192))]
-    width: u32,
-}
-
-/// A range of floor shares.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Fill(pub(super) [f32; 2]);
-
-/// `0.4`, or a range, `0.30-0.45`.
-pub(super) fn parse_fill(text: &str) -> Result<Fill, String> {
-    let number = |text: &str| text.trim().parse::<f32>().map_err(|_| format!("`{text}` is not a number"));
-    let (low, high) = text.split_once('-').unwrap_or((text, text));
-    Ok(Fill([number(low)?, number(high)?]))
-}
-
 /// Does what `nudge scene ...` asks for.
 ///
 /// # Errors
@@ -131,8 +68,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.command {
         Command::New(args) => new(args),
         Command::Check(args) => check(args),
-        Command::Generate(args) => generate_files(args),
-        Command::Thumbnail(args) => thumbnails(args),
+        Command::Generate(args) => generate::run(args),
+        Command::Rescale(args) => rescale::run(args),
+        Command::Thumbnail(args) => thumbnail::run(args),
     }
 }
 
@@ -169,6 +107,10 @@ fn template(name: &str, catalog: &Catalog) -> String {
          # column_closure = true          # above free all is free, below occupied all is occupied\n\n\
          # [meshes]                       # shapes of one's own: class = mesh file, relative to this file\n\
          # chips_can = \"chips_can.obj\"\n\n\
+         # [robot]                        # the arm before the shelf; these are the defaults\n\
+         # base = [0.0, -0.70, -0.015]    # origin of its base, as high as the table that it stands on\n\
+         # yaw_deg = 0.0                  # turn of the base\n\
+         # urdf = \"my_arm.urdf\"          # an arm of one's own, relative to this file, for the UR5 that Nudge has\n\n\
          # Classes, with their size along x, y, z in metres:\n"
     );
     for class in &catalog.classes {
@@ -251,7 +193,11 @@ fn check(args: &CheckArgs) -> anyhow::Result<()> {
 }
 
 fn check_file(file: &Path, catalog: &Catalog, views: &ViewArray) -> nudge_core::Result<(Facts, Vec<String>)> {
-    let (scene, warnings) = Scene::load(file, catalog)?;
+    let (scene, mut warnings) = Scene::load(file, catalog)?;
+    let arm = ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf);
+    if arm.ready.is_none() {
+        warnings.push(format!("{} reaches no place before the shelf from where it stands", arm.arm.name));
+    }
     let bodies = scene.bodies(catalog)?;
     let hidden = hidden_objects(&scene.shelf, &bodies, views);
     let name = |id: &nudge_core::scene::ObjectId| format!("{}#{}", scene.objects[usize::from(id.0)].class, id.0);
@@ -262,86 +208,6 @@ fn check_file(file: &Path, catalog: &Catalog, views: &ViewArray) -> nudge_core::
         hidden: hidden.iter().map(name).collect(),
     };
     Ok((facts, warnings))
-}
-
-/// What `nudge scene generate --json` tells of a scene.
-#[derive(Serialize)]
-struct Generated {
-    file: String,
-    name: String,
-    objects: usize,
-    fill: f32,
-    target_fill: f32,
-    /// Whether the target was reached; if not, nothing more had room.
-    reached: bool,
-    /// Objects unseen from all views, when that was asked for.
-    hidden: Option<usize>,
-}
-
-fn generate_files(args: &GenerateArgs) -> anyhow::Result<()> {
-    let catalog = Catalog::standard();
-    let config = config(args, &catalog)?;
-    let digits = args.count.saturating_sub(1).to_string().len().max(3);
-    let files: Vec<PathBuf> = (0..args.count).map(|at| args.out.join(format!("{at:0digits$}.toml"))).collect();
-    if !args.force
-        && let Some(file) = files.iter().find(|file| file.exists())
-    {
-        return Err(Error::input(file, "", "is there already; --force overwrites it").into());
-    }
-    let views = (args.hidden > 0).then(|| ViewArray::named("standard300")).transpose()?;
-    let bar = progress(args.count, "generating");
-    // All scenes before any file, so that nothing half-done is left behind.
-    let scenes = files
-        .par_iter()
-        .enumerate()
-        .map(|(at, file)| {
-            let generated = generate_one(args, &config, &catalog, views.as_ref(), at, file);
-            bar.inc(1);
-            generated
-        })
-        .collect::<nudge_core::Result<Vec<_>>>()?;
-    bar.finish_and_clear();
-    std::fs::create_dir_all(&args.out).map_err(|error| Error::io(&args.out, error))?;
-    for ((scene, _), file) in scenes.iter().zip(&files) {
-        scene.save_toml(file)?;
-    }
-    let documents: Vec<Generated> = scenes.into_iter().map(|(_, document)| document).collect();
-    for document in documents.iter().filter(|document| !document.reached) {
-        let (fill, target) = (100.0 * document.fill, 100.0 * document.target_fill);
-        warn(&format!("{}: filled to {fill:.1} % of {target:.1} %: nothing more had room", document.file));
-    }
-    if args.json {
-        return print(&to_json(&serde_json::json!({ "seed": args.seed, "scenes": documents }))?);
-    }
-    for document in &documents {
-        let hidden = document.hidden.map_or(String::new(), |hidden| format!(", {hidden} hidden"));
-        let fill = 100.0 * document.fill;
-        print(&format!("{}: {} objects, fill {fill:.1} %{hidden}\n", document.file, document.objects))?;
-    }
-    Ok(())
-}
-
-fn config(args: &GenerateArgs, catalog: &Catalog) -> anyhow::Result<GenerateConfig> {
-    let class = |name: &String| -> Result<ClassId, Error> {
-        catalog.by_name(name).map(|class| class.id).ok_or_else(|| unknown_class(catalog, name))
-    };
-    let classes = args.classes.iter().map(class).collect::<Result<Vec<_>, _>>()?;
-    let mut config = match &args.around {
-        Some(file) => {
-            let (scene, warnings) = Scene::load(file, catalog)?;
-            for warning in warnings {
-                warn(&format!("{}: {warning}", file.display()));
-            }
-            GenerateConfig::around(&with_absolute_meshes(scene, file)?)
-        }
-        None => GenerateConfig::default(),
-    };
-    match args.shelf[..] {
-        [] => {}
-        [width, depth, height] => config.shelf = Shelf::new([width, depth, height]),
-        _ => return Err(Error::Usage("--shelf wants three numbers: width,depth,height".into()).into()),
-    }
-    Ok(GenerateConfig { fill: args.fill.0, rho: args.rho, classes, ..config })
 }
 
 /// An [`Error::Usage`] about a class on the command line.
@@ -374,63 +240,4 @@ fn with_absolute_meshes(mut scene: Scene, file: &Path) -> anyhow::Result<Scene> 
         })
         .collect();
     Ok(scene)
-}
-
-/// Draws scenes until one hides enough objects.
-fn generate_one(
-    args: &GenerateArgs,
-    config: &GenerateConfig,
-    catalog: &Catalog,
-    views: Option<&ViewArray>,
-    at: usize,
-    file: &Path,
-) -> nudge_core::Result<(Scene, Generated)> {
-    let own_seed = rng::derived_seed(args.seed, "generated scenes", at as u64);
-    for draw in 0..MAX_DRAWS {
-        let seed = rng::derived_seed(own_seed, "draws of a scene", draw as u64);
-        let mut scene = generate(catalog, config, seed)?;
-        let hidden = match views {
-            Some(views) => Some(hidden_objects(&scene.shelf, &scene.bodies(catalog)?, views).len()),
-            None => None,
-        };
-        if hidden.is_some_and(|hidden| hidden < args.hidden) {
-            continue;
-        }
-        scene.name = format!("generated-{}-{at:03}", args.seed);
-        let (fill, target_fill) = (scene.fill(catalog)?, config.target_fill(seed));
-        scene.description = match hidden {
-            Some(hidden) => format!("generated: fill {fill:.2}, regularity {}, {hidden} hidden", config.rho),
-            None => format!("generated: fill {fill:.2}, regularity {}", config.rho),
-        };
-        let document = Generated {
-            file: file.display().to_string(),
-            name: scene.name.clone(),
-            objects: scene.objects.len(),
-            fill,
-            target_fill,
-            reached: fill > target_fill - 0.01,
-            hidden,
-        };
-        return Ok((scene, document));
-    }
-    Err(Error::Usage(format!("no scene of {MAX_DRAWS} hides {} objects; ask for more fill", args.hidden)))
-}
-
-fn thumbnails(args: &ThumbnailArgs) -> anyhow::Result<()> {
-    if args.out.is_some() && args.files.len() > 1 {
-        return Err(Error::Usage("--out names the picture of one scene; leave it out for several".to_owned()).into());
-    }
-    let catalog = Catalog::standard();
-    let view = if args.above { View::Above } else { View::Front };
-    let bar = progress(args.files.len(), "drawing");
-    for file in &args.files {
-        let (scene, warnings) = Scene::load(file, &catalog)?;
-        warnings.iter().for_each(|warning| bar.suspend(|| warn(&format!("{}: {warning}", file.display()))));
-        let out = args.out.clone().unwrap_or_else(|| file.with_extension("png"));
-        picture::save(&picture::thumbnail(&scene, &catalog, view, args.width)?, &out)?;
-        bar.suspend(|| print(&format!("{}\n", out.display())))?;
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
-    Ok(())
 }

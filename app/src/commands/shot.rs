@@ -15,9 +15,9 @@ pub struct Args {
     /// Number of actions after which to show it (default: the last state)
     #[arg(long)]
     step: Option<usize>,
-    /// episode, why, gains, push, compare or author
+    /// episode, why, gains, push, compare or author; all for one picture of each
     #[arg(long, default_value = "episode", value_parser = layout)]
-    layout: LayoutKind,
+    layout: Layouts,
     /// Width and height of the window, points
     #[arg(long, default_value = "1440x900", value_parser = size)]
     size: [u32; 2],
@@ -27,17 +27,25 @@ pub struct Args {
     /// The light theme
     #[arg(long)]
     light: bool,
-    /// The picture
+    /// The picture; of several, the layout's name is put behind the file's
     #[arg(long)]
     out: PathBuf,
 }
 
-fn layout(name: &str) -> Result<LayoutKind, String> {
+/// Which layouts are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Layouts {
+    All,
+    One(LayoutKind),
+}
+
+fn layout(name: &str) -> Result<Layouts, String> {
+    if name.eq_ignore_ascii_case("all") {
+        return Ok(Layouts::All);
+    }
     let known = || LayoutKind::ALL.map(|layout| layout.title().to_lowercase()).join(", ");
-    LayoutKind::ALL
-        .into_iter()
-        .find(|layout| layout.title().eq_ignore_ascii_case(name))
-        .ok_or_else(|| format!("there are {}", known()))
+    let one = LayoutKind::ALL.into_iter().find(|layout| layout.title().eq_ignore_ascii_case(name));
+    one.map(Layouts::One).ok_or_else(|| format!("there are {}, all", known()))
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
@@ -51,18 +59,32 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 
 /// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    anyhow::ensure!(args.open.exists(), "{}: no such file or directory", args.open.display());
+    for path in std::iter::once(&args.open).chain(&args.with) {
+        anyhow::ensure!(path.exists(), "{}: no such file or directory", path.display());
+    }
     anyhow::ensure!((0.5..=4.0).contains(&args.scale), "--scale {}: must be between 0.5 and 4", args.scale);
     let out = tempfile::tempdir()?;
     let shot = Shot {
         open: args.open.clone(),
         with: args.with.clone(),
         step: args.step,
-        layout: args.layout,
+        layouts: match args.layout {
+            Layouts::All => LayoutKind::ALL.to_vec(),
+            Layouts::One(layout) => vec![layout],
+        },
         size: args.size,
         scale: args.scale,
         light: args.light,
     };
-    let picture = shoot(&shot, out.path().to_owned())?;
-    Ok(crate::picture::save(&picture, &args.out)?)
+    for (layout, picture) in shoot(&shot, out.path().to_owned())? {
+        let path = match args.layout {
+            Layouts::One(_) => args.out.clone(),
+            Layouts::All => {
+                let stem = args.out.file_stem().unwrap_or_default().to_string_lossy();
+                args.out.with_file_name(format!("{stem}-{}.png", layout.title().to_lowercase()))
+            }
+        };
+        crate::picture::save(&picture, &path)?;
+    }
+    Ok(())
 }

@@ -161,6 +161,13 @@ impl Svg {
         self.push(format_args!(r#"<polygon points="{}" fill="{}"/>"#, points.join(" "), colors::hex(fill)));
     }
 
+    /// A filled polygon that lets through what is below it.
+    pub fn area(&mut self, corners: &[[f32; 2]], fill: Rgb, opacity: f32) {
+        let points: Vec<String> = corners.iter().map(|[x, y]| format!("{x:.2},{y:.2}")).collect();
+        let fill = colors::hex(fill);
+        self.push(format_args!(r#"<polygon points="{}" fill="{fill}" fill-opacity="{opacity}"/>"#, points.join(" ")));
+    }
+
     /// A filled disc with a white rim.
     pub fn dot(&mut self, [x, y]: [f32; 2], radius: f32, fill: Rgb) {
         let fill = colors::hex(fill);

@@ -148,7 +148,7 @@ pub fn of_solid(solid: &Solid, size: [u32; 2]) -> RgbImage {
 }
 
 /// Board, back and side walls of a shelf; no ceiling.
-fn panels(shelf: &Shelf) -> Vec<Item> {
+pub(super) fn panels(shelf: &Shelf) -> Vec<Item> {
     let [width, depth, height] = shelf.size;
     let side = 0.5 * width;
     let panel = |min: [f32; 3], max: [f32; 3], rgb: Rgb| {

@@ -71,7 +71,7 @@ impl Layout {
         stream.set_log_time_enabled(false);
         stream.set_time_sequence("blueprint", 0);
         let mut writer = Writer { stream: &stream, next: 0 };
-        let (root, _) = writer.part(&self.root)?;
+        let root = writer.root(&self.root)?;
         let viewport = bp::ViewportBlueprint::new()
             .with_root_container(bpc::RootContainer::from(Uuid { bytes: root }))
             .with_auto_layout(false)
@@ -105,21 +105,42 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Writes a part; returns its id and its path. A view at the root gets a container around it.
+    /// Writes the whole; returns the root container's id. A view alone gets a container around it: the viewer shows
+    /// nothing at all where its root is a view.
+    fn root(&mut self, part: &Part) -> RecordingStreamResult<[u8; 16]> {
+        let (id, _) = match part {
+            Part::View(_) => self.container(bpc::ContainerKind::Tabs, &[part], Vec::new())?,
+            _ => self.part(part)?,
+        };
+        Ok(id)
+    }
+
+    /// Writes a part; returns its id and its path.
     fn part(&mut self, part: &Part) -> RecordingStreamResult<([u8; 16], EntityPath)> {
-        let id = self.id();
-        let (kind, children, shares): (_, Vec<&Part>, Vec<f32>) = match part {
-            Part::View(view) => return self.view(view, id),
-            Part::Tabs(parts) => (bpc::ContainerKind::Tabs, parts.iter().collect(), Vec::new()),
+        let shared = |parts: &'_ [(f32, Part)]| parts.iter().map(|part| part.0).collect();
+        match part {
+            Part::View(view) => self.view(view),
+            Part::Tabs(parts) => {
+                self.container(bpc::ContainerKind::Tabs, &parts.iter().collect::<Vec<_>>(), Vec::new())
+            }
             Part::Row(parts) => {
-                let shares = parts.iter().map(|part| part.0).collect();
-                (bpc::ContainerKind::Horizontal, parts.iter().map(|part| &part.1).collect(), shares)
+                let children: Vec<&Part> = parts.iter().map(|part| &part.1).collect();
+                self.container(bpc::ContainerKind::Horizontal, &children, shared(parts))
             }
             Part::Column(parts) => {
-                let shares = parts.iter().map(|part| part.0).collect();
-                (bpc::ContainerKind::Vertical, parts.iter().map(|part| &part.1).collect(), shares)
+                let children: Vec<&Part> = parts.iter().map(|part| &part.1).collect();
+                self.container(bpc::ContainerKind::Vertical, &children, shared(parts))
             }
-        };
+        }
+    }
+
+    fn container(
+        &mut self,
+        kind: bpc::ContainerKind,
+        children: &[&Part],
+        shares: Vec<f32>,
+    ) -> RecordingStreamResult<([u8; 16], EntityPath)> {
+        let id = self.id();
         let mut paths = Vec::new();
         for child in children {
             paths.push(self.part(child)?.1.to_string());
@@ -136,7 +157,8 @@ impl Writer<'_> {
         Ok((id, path))
     }
 
-    fn view(&self, view: &View, id: [u8; 16]) -> RecordingStreamResult<([u8; 16], EntityPath)> {
+    fn view(&mut self, view: &View) -> RecordingStreamResult<([u8; 16], EntityPath)> {
+        let id = self.id();
         let path = format!("view/{}", hyphenated(id));
         let contents =
             bp::ViewContents::new(view.contents.iter().map(|query| bpc::QueryExpression(query.as_str().into())));
@@ -168,6 +190,27 @@ fn hyphenated(id: [u8; 16]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::{Layout, Part, View};
+
+    /// Every container's path that the layout's messages name.
+    fn containers(root: Part) -> Vec<String> {
+        let (stream, storage) = rerun::RecordingStreamBuilder::new("nudge_test").memory().expect("stream");
+        Layout { root }.send(&stream, "nudge_test").expect("layout");
+        let chunks = storage.take().into_iter().filter_map(|message| match message {
+            super::LogMsg::ArrowMsg(_, arrow) => rerun::log::Chunk::from_arrow_msg(&arrow).ok(),
+            _ => None,
+        });
+        let paths = chunks.map(|chunk| chunk.entity_path().to_string());
+        paths.filter(|path| path.starts_with("/container/")).collect()
+    }
+
+    #[test]
+    fn the_root_is_always_a_container() {
+        let view = || Part::View(View::new("3D", "Belief", "/", ["/belief"]));
+        assert_eq!(containers(view()).len(), 1);
+        assert_eq!(containers(Part::Row(vec![(1.0, view()), (1.0, view())])).len(), 1);
+    }
+
     #[test]
     fn ids_are_written_like_uuids() {
         assert_eq!(super::hyphenated(*b"nudge layout v1\x01"), "6e756467-6520-6c61-796f-757420763101");

@@ -53,6 +53,19 @@ pub fn line(record: &StepRecord) -> String {
     )
 }
 
+/// What went wrong in a step, one line each.
+pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
+    let mut words: Vec<String> = record.dropped.iter().map(|name| format!("dropped {name}")).collect();
+    if let Some(push) = &record.push {
+        if push.stalled {
+            words.push(format!("the arm was blocked after {:.0} mm of its push", push.pushed_m * 1e3));
+        }
+        words.extend(push.contacts.iter().map(|touch| format!("the arm's {} touched {}", touch.link, touch.object)));
+        words.extend(push.against_wall.iter().map(|name| format!("{name} was pressed against a wall")));
+    }
+    words
+}
+
 /// An action in words.
 pub(crate) fn action(action: &Action) -> String {
     match action {
@@ -150,31 +163,55 @@ fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
     };
     let _ = write!(
         page,
-        "**Pushes**: {} drawn, {} feasible; {} without a target, {} blocked at the start, {} on the way, {} by the shelf\n\n",
+        "**Pushes**: {} drawn, {} feasible; {} without a target, {} out of reach, {} blocked, {} without a free way\n\n",
         decision.candidates.len(),
         feasible.len(),
         count(|r| matches!(r, Rejection::NoTarget)),
-        count(|r| matches!(r, Rejection::StartBlocked { .. })),
-        count(|r| matches!(r, Rejection::PathBlocked { .. })),
-        count(|r| matches!(r, Rejection::Shelf)),
+        count(|r| matches!(r, Rejection::Unreachable { .. })),
+        count(|r| {
+            matches!(
+                r,
+                Rejection::StartBlocked { .. }
+                    | Rejection::PathBlocked { .. }
+                    | Rejection::Shelf
+                    | Rejection::ArmBlocked { .. }
+            )
+        }),
+        count(|r| matches!(r, Rejection::NoWay)),
     );
+    reasons(page, decision);
     if feasible.is_empty() {
         return;
     }
     page.push_str(
-        "| push | from x, y (m) | towards | length | gain | Reg | value, nats |\n|--:|:--|--:|--:|--:|--:|--:|\n",
+        "| push | from x, y (m) | towards | length | arm | gain | Reg | value, nats |\n|--:|:--|--:|--:|--:|--:|--:|--:|\n",
     );
     for (at, value, c) in feasible.iter().take(LISTED) {
         let best = if decision.best_push == Some(*at) { " ●" } else { "" };
         let [x, y, _] = c.push.start;
         let _ = writeln!(
             page,
-            "| {at}{best} | {x:.2}, {y:.2} | {:.0}° | {:.0} mm | {:.1} | {:.1} | {value:.1} |",
+            "| {at}{best} | {x:.2}, {y:.2} | {:.0}° | {:.0} mm | {:.1} s | {:.1} | {:.1} | {value:.1} |",
             c.push.direction_deg,
             c.push.length_m * 1e3,
+            c.motion_s.unwrap_or(0.0),
             c.gain.unwrap_or(0.0),
             c.reg.unwrap_or(0.0)
         );
+    }
+    page.push('\n');
+}
+
+/// The commonest reasons why candidates were rejected.
+fn reasons(page: &mut String, decision: &Decision) {
+    let mut counts = std::collections::BTreeMap::<String, usize>::new();
+    for rejection in decision.candidates.iter().filter_map(|candidate| candidate.rejection.as_ref()) {
+        *counts.entry(rejection.kind_words()).or_default() += 1;
+    }
+    let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
+    counts.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
+    for (words, count) in counts.iter().take(LISTED) {
+        let _ = writeln!(page, "* {count} rejected: {words}");
     }
     page.push('\n');
 }

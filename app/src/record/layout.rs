@@ -14,7 +14,13 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
     let at = |path: &str| format!("{root}/{path}");
     let space = |name: &str, shown: &[&str]| {
         let always = [paths::SHELF, paths::SHELF_EDGES];
-        Part::View(spatial(name, root, always.iter().chain(shown).map(|path| at(path)).collect()))
+        Part::View(spatial(
+            name,
+            root,
+            Eye::SHELF,
+            Ground::Dark,
+            always.iter().chain(shown).map(|path| at(path)).collect(),
+        ))
     };
     let objects = "world/objects/**";
     let spaces = Part::Tabs(vec![
@@ -29,6 +35,11 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
             "Pushes",
             &[paths::PUSH_CANDIDATES, paths::PUSH_CHOSEN, paths::PUSH_SWEPT, paths::BELIEF_OCCUPANCY, objects],
         ),
+        Part::View(spatial("Robot", root, Eye::ROBOT, Ground::Dark, {
+            let robot = [paths::CAMERA_REACH, paths::ROBOT_PATH, "robot/bodies/**", paths::CAMERA_CURRENT];
+            let shelf = [paths::SHELF, paths::SHELF_EDGES, paths::PUSH_CHOSEN, paths::PUSH_SWEPT, objects];
+            robot.iter().chain(&shelf).map(|path| at(path)).collect()
+        })),
         space("Predicted", &[paths::PREDICTED_OCCUPANCY, paths::PUSH_CHOSEN, objects]),
         space("Truth", &[paths::TRUTH_OCCUPANCY]),
         space("Error", &[paths::ERROR_OCCUPANCY, objects]),
@@ -115,20 +126,60 @@ fn root_or_slash(root: &str) -> &str {
     if root.is_empty() { "/" } else { root }
 }
 
+/// From where an eye looks, and at what, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Eye {
+    position: [f32; 3],
+    target: [f32; 3],
+}
+
+impl Eye {
+    /// The whole shelf, in a view that is at least as wide as high.
+    pub(crate) const SHELF: Self = Self { position: [0.0, -0.78, 0.60], target: [0.0, 0.16, 0.11] };
+    /// Beside the robot, so that arm and shelf are both in sight.
+    pub(crate) const ROBOT: Self = Self { position: [1.05, -1.10, 0.85], target: [0.0, -0.22, 0.18] };
+
+    /// The same look from `factor` times as far.
+    pub(crate) fn farther(self, factor: f32) -> Self {
+        let back = |axis: usize| self.target[axis] + factor * (self.position[axis] - self.target[axis]);
+        Self { position: std::array::from_fn(back), ..self }
+    }
+}
+
+/// What is behind the things in three dimensions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ground {
+    /// For screens.
+    Dark,
+    /// For print.
+    Light,
+}
+
+impl Ground {
+    /// The colour of the ground, and of the grid on it.
+    fn rgb(self) -> [[u8; 3]; 2] {
+        match self {
+            Self::Dark => [[30, 32, 38], [74, 77, 86]],
+            Self::Light => [[250, 250, 251], [206, 209, 215]],
+        }
+    }
+}
+
 /// A view into the shelf from the robot's side, slightly above, with a 10 cm grid on the board.
-pub(crate) fn spatial(name: &str, root: &str, contents: Vec<String>) -> View {
+pub(crate) fn spatial(name: &str, root: &str, eye: Eye, ground: Ground, contents: Vec<String>) -> View {
     let eye = bp::EyeControls3D::new()
         .with_kind(bpc::Eye3DKind::Orbital)
-        .with_position([0.0, -0.78, 0.60])
-        .with_look_target([0.0, 0.16, 0.11])
+        .with_position(eye.position)
+        .with_look_target(eye.target)
         .with_eye_up([0.0, 0.0, 1.0]);
+    let [ground, line] = ground.rgb();
     let grid = bp::LineGrid3D::new()
         .with_visible(true)
         .with_spacing(0.1)
         .with_plane(rerun::components::Plane3D::XY)
         .with_stroke_width(0.6)
-        .with_color(rerun::Color::from([74, 77, 86]));
-    let background = bp::Background::new(bpc::BackgroundKind::SolidColor).with_color(rerun::Color::from([30, 32, 38]));
+        .with_color(rerun::Color::from(line));
+    let background = bp::Background::new(bpc::BackgroundKind::SolidColor).with_color(rerun::Color::from(ground));
     View::new("3D", name, root_or_slash(root), contents)
         .with("EyeControls3D", &eye)
         .with("LineGrid3D", &grid)

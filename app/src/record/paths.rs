@@ -7,6 +7,8 @@ use nudge_core::scene::ObjectId;
 
 /// The timeline of episodes: number of actions so far.
 pub const TIMELINE: &str = "step";
+/// The robot's own clock, seconds that it has moved: for scrubbing through its motions.
+pub const ROBOT_TIMELINE: &str = "robot";
 
 /// The shelf's panels.
 pub const SHELF: &str = "world/shelf";
@@ -14,6 +16,8 @@ pub const SHELF: &str = "world/shelf";
 pub const SHELF_EDGES: &str = "world/shelf/edges";
 /// The candidate views as frusta, coloured by gain.
 pub const CAMERA_VIEWS: &str = "camera/views";
+/// Where the hand can be to look, and where it cannot.
+pub const CAMERA_REACH: &str = "camera/reach";
 /// The camera that took the step's image.
 pub const CAMERA_CURRENT: &str = "camera/current";
 /// Its depth image.
@@ -46,6 +50,8 @@ pub const PUSH_CANDIDATES: &str = "push/candidates";
 pub const PUSH_CHOSEN: &str = "push/chosen";
 /// What the tool swept.
 pub const PUSH_SWEPT: &str = "push/swept";
+/// The way of the arm's tip in this step.
+pub const ROBOT_PATH: &str = "robot/path";
 /// Voxels predicted occupied after the push, where it can reach.
 pub const PREDICTED_OCCUPANCY: &str = "predicted/occupancy";
 /// Classes predicted after the push, where it can reach.
@@ -92,6 +98,11 @@ pub fn training(curve: &str) -> String {
 /// An object of the scene.
 pub fn object(id: ObjectId) -> String {
     format!("world/objects/{}", id.0)
+}
+
+/// A rigid body of the arm, the base first.
+pub fn robot_body(number: usize) -> String {
+    format!("robot/bodies/{number}")
 }
 
 /// A score by its key in `episode.json`.

@@ -54,7 +54,7 @@ pub(crate) fn facets(parts: &[ConvexPart]) -> Vec<(Point, Vector)> {
 }
 
 /// Convex parts as a mesh.
-fn mesh(parts: &[ConvexPart]) -> rerun::Mesh3D {
+pub(super) fn mesh(parts: &[ConvexPart]) -> rerun::Mesh3D {
     let corners = facets(parts);
     let triangles = (0..corners.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
     rerun::Mesh3D::new(corners.iter().map(|(position, _)| <[f32; 3]>::from(position.coords)))

@@ -24,6 +24,8 @@ fn a_recording_stays_small_and_names_its_entities() {
         views: &played.views,
         budget: steps,
         gamma: 0.2,
+        arm: None,
+        unreachable: &[],
     };
     let mut recorder = Recorder::begin(&path, "test", &setting).expect("file");
     let mut sizes = Vec::new();
@@ -56,7 +58,9 @@ fn entities_are_named_as_the_contract_says() {
     let names = [
         (paths::SHELF, "world/shelf"),
         (paths::CAMERA_VIEWS, "camera/views"),
+        (paths::CAMERA_REACH, "camera/reach"),
         (paths::CAMERA_CURRENT, "camera/current"),
+        (paths::ROBOT_PATH, "robot/path"),
         (paths::OBSERVATION_DEPTH, "observation/depth"),
         (paths::OBSERVATION_LABELS, "observation/labels"),
         (paths::BELIEF_OCCUPANCY, "belief/occupancy"),
@@ -80,6 +84,7 @@ fn entities_are_named_as_the_contract_says() {
         assert_eq!(name, contract);
     }
     assert_eq!(paths::object(ObjectId(7)), "world/objects/7");
+    assert_eq!(paths::robot_body(2), "robot/bodies/2");
     assert_eq!(paths::score("entropy_nats"), "scores/entropy_nats");
     let (stream, _storage) = RecordingStreamBuilder::new(APPLICATION).memory().expect("stream");
     assert_eq!(Recorder::bare(stream.clone(), "", Path::new("")).at(paths::LOG).to_string(), "/log");

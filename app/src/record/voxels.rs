@@ -120,11 +120,16 @@ pub fn errors(belief: &Belief, truth: &TruthMap) -> VoxelGridMap {
     colored(grid, &shown, |index| if believed(index) { colors::HALLUCINATED_RGB } else { colors::MISSED_RGB })
 }
 
-/// Where a gain comes from (cividis, up to the 99th percentile so that a few voxels do not hide the rest).
-pub fn gains(grid: &Grid, nats: &[(usize, f32)]) -> VoxelGridMap {
+/// The gain per voxel at the top of the colour scale, nats: what only one voxel in a hundred exceeds.
+pub fn gain_top(nats: &[(usize, f32)]) -> f32 {
     let mut sorted: Vec<f32> = nats.iter().map(|(_, nats)| *nats).collect();
     sorted.sort_unstable_by(f32::total_cmp);
-    let top = sorted.get(sorted.len().saturating_sub(1) * 99 / 100).copied().unwrap_or(1.0);
+    sorted.get(sorted.len().saturating_sub(1) * 99 / 100).copied().unwrap_or(1.0)
+}
+
+/// Where a gain comes from (cividis, up to the 99th percentile so that a few voxels do not hide the rest).
+pub fn gains(grid: &Grid, nats: &[(usize, f32)]) -> VoxelGridMap {
+    let top = gain_top(nats);
     // Voxels that tell next to nothing are left out.
     let telling: Vec<(usize, f32)> = nats.iter().copied().filter(|(_, nats)| *nats > 0.05 * top).collect();
     let shown: Vec<usize> = telling.iter().map(|(index, _)| *index).collect();

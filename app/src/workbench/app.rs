@@ -2,20 +2,28 @@
 
 mod carry_out;
 mod draw;
+mod files;
 mod take_in;
+#[cfg(test)]
+mod tests;
 
-use super::command::{Command, Level};
+use super::browser::Browser;
+use super::command::Command;
 use super::derive::Derived;
 use super::dialog::Dialog;
-use super::jobs::Jobs;
+use super::latest::{Latest, Wake};
 use super::model::{GainSource, LayoutKind, Model, Preview, Remembered};
 use super::session::{Activity, SessionId};
 use super::space::{Drawn, Painter};
+use super::tasks::Tasks;
+use super::threads::Threads;
 use super::viewer::Viewer;
-use super::worker::{Event, Wake, Worker};
+use super::worker::{Event, Worker};
+use nudge_core::camera::ViewId;
+use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
 use rerun::external::{eframe, egui};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -28,8 +36,12 @@ const STORAGE_KEY: &str = "nudge workbench";
 pub struct Options {
     /// A scene, an episode or a recording to open.
     pub open: Option<PathBuf>,
+    /// With what an episode is started; what is remembered otherwise.
+    pub form: FormOptions,
     /// The folder that new episodes go to.
     pub out: PathBuf,
+    /// The folder of the scenes to choose from.
+    pub scenes: PathBuf,
     /// Whether choices outlast the program.
     pub remember: bool,
     /// Light instead of dark; what is remembered otherwise.
@@ -40,6 +52,21 @@ pub struct Options {
     pub look_only: bool,
     /// What to do without a person.
     pub script: Option<Script>,
+    /// The port at 127.0.0.1 where other viewers on this machine may look on; none unless it is asked for.
+    pub serve: Option<u16>,
+    /// The threads of the episodes, to be waited for once the window is gone.
+    pub threads: Threads,
+}
+
+/// Choices for the first episode that were made before the window opened.
+#[derive(Clone, Debug, Default)]
+pub struct FormOptions {
+    /// The rule that chooses actions.
+    pub policy: Option<PolicyKind>,
+    /// Number of actions.
+    pub budget: Option<usize>,
+    /// Seed of every random choice.
+    pub seed: Option<u64>,
 }
 
 /// Something to do before the program ends by itself.
@@ -55,23 +82,92 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             open: None,
+            form: FormOptions::default(),
             out: PathBuf::from("out"),
+            scenes: PathBuf::from(super::browser::FOLDER),
             remember: false,
             light: None,
             layout: None,
             look_only: false,
             script: None,
+            serve: None,
+            threads: Threads::default(),
         }
     }
 }
 
-/// What a job answers.
-enum Answer {
-    Maps(Derived),
-    Preview(Preview),
-    Gain(GainSource),
-    Tell(Level, String),
-    Chosen(ChosenFor, PathBuf),
+/// What is made in the background, each by a thread of its own that does the latest that it was asked for.
+struct Background {
+    maps: Latest<Derived>,
+    other_maps: Latest<Derived>,
+    preview: Latest<Preview>,
+    gain: Latest<GainSource>,
+    space: Latest<()>,
+}
+
+impl Background {
+    fn new(wake: &Wake) -> Self {
+        let background = Self {
+            maps: Latest::new("floor maps"),
+            other_maps: Latest::new("floor maps of the other episode"),
+            preview: Latest::new("push preview"),
+            gain: Latest::new("gain of a view"),
+            space: Latest::new("three-dimensional views"),
+        };
+        background.maps.wake_with(wake.clone());
+        background.other_maps.wake_with(wake.clone());
+        background.preview.wake_with(wake.clone());
+        background.gain.wake_with(wake.clone());
+        background.space.wake_with(wake.clone());
+        background
+    }
+
+    fn is_busy(&self) -> bool {
+        self.maps.is_busy()
+            || self.other_maps.is_busy()
+            || self.preview.is_busy()
+            || self.gain.is_busy()
+            || self.space.is_busy()
+    }
+
+    /// Why jobs broke down since the last call.
+    fn broke(&self) -> Vec<String> {
+        let (maps, views) =
+            ([&self.maps, &self.other_maps], [self.preview.broke(), self.gain.broke(), self.space.broke()]);
+        maps.into_iter().map(Latest::broke).chain(views).flatten().collect()
+    }
+}
+
+/// A part of the window that can be exported as a picture of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Part {
+    /// All of it.
+    #[default]
+    Window,
+    /// The three-dimensional views.
+    Space,
+    /// Floor maps and camera images.
+    Maps,
+    /// The score curves.
+    Curves,
+    /// The panel at the right.
+    Right,
+}
+
+impl Part {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Window, Self::Space, Self::Maps, Self::Curves, Self::Right];
+
+    /// As a choice names it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Window => "the whole window",
+            Self::Space => "the three-dimensional views",
+            Self::Maps => "the floor maps and camera images",
+            Self::Curves => "the score curves",
+            Self::Right => "the panel at the right",
+        }
+    }
 }
 
 /// What a file dialog was opened for.
@@ -89,6 +185,14 @@ pub struct Opening {
     pub activity: Activity,
 }
 
+/// Both ends of a channel; the first is cloned for every thread that tells something.
+type Channel<T> = (Sender<T>, Receiver<T>);
+
+/// Two episodes that are run side by side, once both are open.
+struct Pair {
+    ids: [SessionId; 2],
+}
+
 /// The window's state around the [`Model`].
 pub struct App {
     /// What is shown.
@@ -97,19 +201,29 @@ pub struct App {
     catalog: Arc<Catalog>,
     workers: BTreeMap<SessionId, Worker>,
     openings: BTreeMap<SessionId, Opening>,
-    events: (Sender<(SessionId, Event)>, Receiver<(SessionId, Event)>),
-    answers: (Sender<Answer>, Receiver<Answer>),
-    jobs: Jobs,
+    events: Channel<(SessionId, Event)>,
+    /// Paths that were chosen in the system's dialogs.
+    chosen: Channel<(ChosenFor, PathBuf)>,
+    background: Background,
+    tasks: Tasks,
+    pairs: Vec<Pair>,
+    /// Directories that episodes were begun in, whether they are there yet or not.
+    begun: BTreeSet<PathBuf>,
+    /// The gain that was asked for last: the state and the view.
+    asked_gain: Option<((SessionId, usize), ViewId)>,
+    /// Where the parts of the window were drawn last, points.
+    parts: Vec<(Part, egui::Rect)>,
     viewer: Option<Viewer>,
     /// Why there is no viewer.
     no_viewer: Option<String>,
+    /// What draws.
+    graphics: String,
     painter: Option<Arc<Mutex<Painter>>>,
     drawn: Drawn,
     /// What the three-dimensional views were last asked to show.
     asked_space: String,
     wake: Wake,
     next_id: u32,
-    errands: u64,
     dialog: Option<Dialog>,
     /// Whether a person has said that unsaved work may go.
     may_quit: bool,
@@ -117,7 +231,8 @@ pub struct App {
     frame_ms: Option<f32>,
     /// Milliseconds that the viewer took of the last frame.
     viewer_ms: f32,
-    picture_to: Option<PathBuf>,
+    last_viewer_ms: f32,
+    picture_to: Option<(Part, PathBuf)>,
     /// Frames since the script has nothing more to do.
     script_frames: usize,
     /// What only the next frame can do.
@@ -137,13 +252,19 @@ impl App {
         {
             app.model.kept = kept;
         }
-        match Viewer::new(cc) {
+        match Viewer::new(cc, app.options.serve) {
             Ok((viewer, stream)) => {
                 app.viewer = Some(viewer);
+                app.model.serving = app.options.serve;
                 app.painter = Some(Arc::new(Mutex::new(Painter::new(stream, app.drawn.clone()))));
             }
             Err(reason) => app.no_viewer = Some(reason),
         }
+        if let Some(state) = &cc.wgpu_render_state {
+            let adapter = state.adapter.get_info();
+            app.graphics = format!("{} ({:?})", adapter.name, adapter.backend);
+        }
+        app.tell_graphics(&cc.egui_ctx);
         app.begin();
         app
     }
@@ -157,34 +278,35 @@ impl App {
     }
 
     fn bare(ctx: &egui::Context, options: Options) -> Self {
-        let answers = channel();
-        let (tell, repaint) = (answers.0.clone(), ctx.clone());
-        let broke = move |words: String| {
-            let _ = tell.send(Answer::Tell(Level::Error, format!("A background job broke down: {words}")));
-            repaint.request_repaint();
-        };
         let repaint = ctx.clone();
+        let wake: Wake = Arc::new(move || repaint.request_repaint());
         Self {
-            model: Model::default(),
+            model: Model { browser: Browser::of(&options.scenes), ..Model::default() },
             options,
             catalog: Arc::new(Catalog::standard()),
             workers: BTreeMap::new(),
             openings: BTreeMap::new(),
             events: channel(),
-            answers,
-            jobs: Jobs::start(broke),
+            chosen: channel(),
+            background: Background::new(&wake),
+            tasks: Tasks::default(),
+            pairs: Vec::new(),
+            begun: BTreeSet::new(),
+            asked_gain: None,
+            parts: Vec::new(),
             viewer: None,
             no_viewer: None,
+            graphics: "none".to_owned(),
             painter: None,
             drawn: Drawn::default(),
             asked_space: String::new(),
-            wake: Arc::new(move || repaint.request_repaint()),
+            wake,
             next_id: 0,
-            errands: 0,
             dialog: None,
             may_quit: false,
             frame_ms: None,
             viewer_ms: 0.0,
+            last_viewer_ms: 0.0,
             picture_to: None,
             script_frames: 0,
             picture_asked: false,
@@ -202,8 +324,16 @@ impl App {
         if let Some(layout) = self.options.layout {
             self.model.kept.layout = layout;
         }
+        let (form, chosen) = (&mut self.model.kept.form, &self.options.form);
+        form.policy = chosen.policy.unwrap_or(form.policy);
+        form.budget = chosen.budget.unwrap_or(form.budget);
+        form.seed = chosen.seed.unwrap_or(form.seed);
         self.model.author.wake_with(self.wake.clone());
         if let Some(path) = self.options.open.clone() {
+            if self.options.layout.is_none() && self.model.kept.layout == LayoutKind::Author {
+                // Remembered from the last time; what is named on the command line is to be seen, not edited.
+                self.model.kept.layout = LayoutKind::Episode;
+            }
             self.carry_out(Command::Open(path));
         }
     }
@@ -212,7 +342,18 @@ impl App {
     pub fn is_busy(&self) -> bool {
         !self.openings.is_empty()
             || self.model.sessions.iter().any(|session| session.activity != Activity::Idle)
-            || !self.jobs.is_idle()
+            || self.background.is_busy()
+            || !self.tasks.under_way().is_empty()
+    }
+
+    /// An open question in front of everything else.
+    pub fn dialog(&self) -> Option<&Dialog> {
+        self.dialog.as_ref()
+    }
+
+    /// Voxels of the belief that are drawn in three dimensions.
+    pub fn drawn_voxels(&self) -> usize {
+        self.drawn.count(super::space::at::BELIEF)
     }
 
     /// Why there are no three-dimensional views, if there are none.
@@ -230,6 +371,17 @@ impl App {
         self.frame_ms
     }
 
+    /// Milliseconds that the viewer's views took of the last frame, on the processor.
+    pub fn last_viewer_ms(&self) -> f32 {
+        self.last_viewer_ms
+    }
+
+    /// Whether maps and three-dimensional views show the state at the cursor.
+    pub fn is_shown(&self) -> bool {
+        let key = self.model.session().map(|session| (session.id, session.moment(self.model.cursor).step));
+        key.is_none_or(|key| self.model.derived.contains_key(&key) && !self.background.space.is_busy())
+    }
+
     /// Why the program should not end without asking: what would be lost.
     fn unsaved(&self) -> Vec<String> {
         let mut lost: Vec<String> = self
@@ -242,16 +394,8 @@ impl App {
         if self.model.author.is_unsaved() {
             lost.push(format!("the scene {}", self.model.author.scene().name));
         }
+        lost.extend(self.tasks.under_way().iter().map(|task| format!("{}, which is not finished", task.title)));
         lost
-    }
-
-    fn errand(&mut self, work: impl FnOnce(&Sender<Answer>) + Send + 'static) {
-        self.errands += 1;
-        let (answers, wake) = (self.answers.0.clone(), self.wake.clone());
-        self.jobs.add(super::jobs::JobKind::Errand(self.errands), move || {
-            work(&answers);
-            wake();
-        });
     }
 }
 

@@ -98,6 +98,7 @@ fn empty() -> Scene {
         shelf: Shelf::new([0.80, 0.40, 0.40]),
         objects: Vec::new(),
         meshes: Default::default(),
+        robot: Default::default(),
     }
 }
 

@@ -15,7 +15,8 @@ pub enum Command {
     Menu(MenuCommand),
     /// Opens a scene, an episode's directory or a recording.
     Open(PathBuf),
-    /// Starts an episode of the chosen scene with the chosen policy, seed and budget.
+    /// Starts an episode of the chosen scene with the chosen policy, seed and budget; two that run side by side where a
+    /// second policy is chosen.
     Start,
     /// Shows another open episode.
     Show(SessionId),
@@ -35,8 +36,14 @@ pub enum Command {
     DoInstead(Action),
     /// Decides and acts until the budget is used up.
     Run,
-    /// Stops a run after the step that it is at, or an opening.
+    /// Runs both episodes of the comparison.
+    RunBoth,
+    /// Stops a run after the action that it is at.
+    Pause,
+    /// Stops a run without doing what it decides just now, or an opening.
     Cancel,
+    /// Stops an export or another task, by its position.
+    CancelTask(usize),
     /// Starts an episode that shares the steps up to the cursor.
     Branch,
     /// Asks what a push would do to the belief at the cursor.
@@ -53,6 +60,10 @@ pub enum Command {
     CloseRecording,
     /// Starts an episode of the scene that is being authored.
     TryScene,
+    /// Opens a copy of the shown episode's scene in the editor.
+    EditScene,
+    /// Shows the scenes to choose from, or goes back from them.
+    Browse(bool),
     /// Tells of something, as a toast.
     Tell(Level, String),
     /// A decision that a test or a script made.
@@ -73,6 +84,8 @@ pub enum Level {
 /// The entries of the menus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MenuCommand {
+    /// Shows the scenes to choose from.
+    Scenes,
     /// Opens a scene by the system's dialog.
     OpenScene,
     /// Opens an episode's directory by the system's dialog.
@@ -113,10 +126,16 @@ pub enum MenuCommand {
     DoIt,
     /// Runs to the budget.
     Run,
+    /// Stops after the action that is under way.
+    Pause,
     /// Stops.
     Cancel,
+    /// Runs both episodes of the comparison.
+    RunBoth,
     /// Branches at the cursor.
     Branch,
+    /// Edits a copy of the scene.
+    EditScene,
     /// The layouts, in the order of their tabs.
     Layout(LayoutKind),
     /// Light or dark.

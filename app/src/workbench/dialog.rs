@@ -1,6 +1,8 @@
 //! Questions that the window asks in front of everything else.
 
+use super::app::Part;
 use super::command::MenuCommand;
+use super::session::SessionId;
 use std::path::{Path, PathBuf};
 
 /// An open question.
@@ -12,6 +14,19 @@ pub enum Dialog {
         what: MenuCommand,
         /// The path as it is typed.
         path: String,
+        /// Which part of the window, for a picture.
+        part: Part,
+    },
+    /// An episode's worker broke down: what shall become of the episode.
+    Broke {
+        /// The episode.
+        id: SessionId,
+        /// The panic's words.
+        words: String,
+        /// Its directory.
+        path: PathBuf,
+        /// Number of actions that are in it.
+        steps: usize,
     },
     /// Whether unsaved work may be lost.
     Quit {
@@ -27,7 +42,7 @@ pub enum Dialog {
 impl Dialog {
     /// Asks where something shall be written, with a proposal.
     pub fn write_to(what: MenuCommand, proposal: &Path) -> Self {
-        Self::WriteTo { what, path: proposal.display().to_string() }
+        Self::WriteTo { what, path: proposal.display().to_string(), part: Part::Window }
     }
 
     /// Takes the path that a person has chosen in the system's dialog.
@@ -41,8 +56,12 @@ impl Dialog {
 /// What a question was answered with.
 #[derive(Clone, Debug)]
 pub enum Reply {
-    /// Write it there.
-    Write(MenuCommand, PathBuf),
+    /// Write it, or that part of the window, there.
+    Write(MenuCommand, PathBuf, Part),
+    /// Export the episode whose worker broke down.
+    Export(SessionId),
+    /// Close it and open its directory again, to go on.
+    Reopen(SessionId),
     /// Choose a path in the system's dialog.
     Browse(MenuCommand),
     /// Save what is unsaved, then quit.

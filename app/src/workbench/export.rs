@@ -15,6 +15,7 @@ use crate::figure;
 use crate::picture;
 use crate::record::{self, Recorder, Setting, State};
 use image::{ImageBuffer, Pixel, PixelWithColorType};
+use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::belief::Belief;
 use nudge_core::episode::{EpisodeDir, EpisodeRecord};
 use nudge_core::files::{TEMPORARY, names_in, write_atomically};
@@ -114,7 +115,11 @@ fn record_of(session: &Session) -> EpisodeRecord {
 }
 
 fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Watch<'_>) -> Result<()> {
+    let arm = ArmTool::new(Arm::placed(&record.scene.robot)?, record.scene.shelf);
+    let unreachable = session.setup.views.unreachable(&session.setup.views.hand_poses(&arm));
     let setting = Setting {
+        arm: Some(&arm),
+        unreachable: &unreachable,
         shelf: &record.scene.shelf,
         catalog: &session.setup.catalog,
         views: &session.setup.views,

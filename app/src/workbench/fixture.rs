@@ -114,6 +114,7 @@ impl Played {
             moments: self.moments.clone(),
             pending: self.pending.clone(),
             activity: Activity::Idle,
+            read_only: None,
             annotations: super::annotations::Annotations::default(),
             unsaved: false,
         }
@@ -168,7 +169,7 @@ pub fn answer(model: &mut Model) {
     });
     let source = model.view.map(|view| {
         let nats = gain_per_voxel(&GainField::new(&belief), &session.setup.views, view, RayDensity::FULL);
-        GainSource { of: (session.id, step), view, nats: Arc::new(nats) }
+        GainSource::new((session.id, step), view, nats)
     });
     model.preview = preview;
     model.gain_source = source;

@@ -1,8 +1,9 @@
 //! Work in the background of which only the latest matters: while one job runs, newer ones replace each other in line.
 //!
 //! A running job is let finish, so that answers keep coming while a person drags; [`Latest::hurry`] tells it to give up
-//! when its answer is of no use any more.
+//! when its answer is of no use any more. What must be done whatever comes after it is a task ([`super::tasks`]).
 
+use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -31,6 +32,7 @@ struct Line<A> {
     next: Option<Job<A>>,
     is_running: bool,
     answer: Option<(u64, A)>,
+    broke: Option<String>,
     is_closed: bool,
     wake: Option<Wake>,
 }
@@ -58,7 +60,8 @@ pub struct Latest<A> {
 impl<A: Send + 'static> Latest<A> {
     /// A line without a thread; that starts with the first job and ends with this value.
     pub fn new(name: &'static str) -> Self {
-        let line = Line { asked: 0, next: None, is_running: false, answer: None, is_closed: false, wake: None };
+        let line =
+            Line { asked: 0, next: None, is_running: false, answer: None, broke: None, is_closed: false, wake: None };
         let shared = Shared { line: Mutex::new(line), arrived: Condvar::new(), oldest_wanted: Arc::default() };
         Self { name, shared: Arc::new(shared), is_started: false }
     }
@@ -102,6 +105,11 @@ impl<A: Send + 'static> Latest<A> {
         self.shared.line().answer.take()
     }
 
+    /// Why the last job that broke down did, once.
+    pub fn broke(&self) -> Option<String> {
+        self.shared.line().broke.take()
+    }
+
     /// Whether a job runs or waits.
     pub fn is_busy(&self) -> bool {
         let line = self.shared.line();
@@ -135,13 +143,15 @@ fn work<A>(shared: &Shared<A>) {
                 line = shared.arrived.wait(line).unwrap_or_else(PoisonError::into_inner);
             }
         };
-        // A job that panics has no answer; the next one may have.
-        let answer = catch_unwind(AssertUnwindSafe(|| job(&waiting))).ok().flatten();
+        let done = catch_unwind(AssertUnwindSafe(|| job(&waiting)));
         let wake = {
             let mut line = shared.line();
             line.is_running = false;
-            if let Some(answer) = answer.filter(|_| waiting.go_on()) {
-                line.answer = Some((waiting.number, answer));
+            match done {
+                Ok(Some(answer)) if waiting.go_on() => line.answer = Some((waiting.number, answer)),
+                Ok(_) => {}
+                // A job that panics has no answer; the next one may have.
+                Err(panic) => line.broke = Some(words_of(&*panic)),
             }
             line.wake.clone()
         };
@@ -149,6 +159,12 @@ fn work<A>(shared: &Shared<A>) {
             wake();
         }
     }
+}
+
+/// A panic's own words.
+pub fn words_of(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
+    text.unwrap_or("no reason was given").to_owned()
 }
 
 #[cfg(test)]
@@ -198,6 +214,8 @@ mod tests {
         wakes.recv().expect("gave up");
         wakes.recv().expect("panicked");
         assert_eq!(latest.take(), None);
+        assert_eq!(latest.broke().as_deref(), Some("a broken job"));
+        assert_eq!(latest.broke(), None, "told once");
         let last = latest.ask(|_| Some(5));
         wakes.recv().expect("the thread is still there");
         assert_eq!(latest.take(), Some((last, 5)));

@@ -2,7 +2,7 @@
 
 use super::command::MenuCommand as M;
 use super::model::{LayoutKind, Model};
-use super::session::Activity;
+use super::session::{Activity, Session};
 use rerun::external::egui::{Key, KeyboardShortcut, Modifiers};
 
 /// A menu with its entries; `None` is a line between them.
@@ -10,6 +10,7 @@ pub const MENUS: [(&str, &[Option<M>]); 5] = [
     (
         "File",
         &[
+            Some(M::Scenes),
             Some(M::OpenScene),
             Some(M::OpenEpisode),
             None,
@@ -47,6 +48,8 @@ pub const MENUS: [(&str, &[Option<M>]); 5] = [
             Some(M::Decide),
             Some(M::DoIt),
             Some(M::Run),
+            Some(M::RunBoth),
+            Some(M::Pause),
             Some(M::Cancel),
             None,
             Some(M::First),
@@ -55,6 +58,7 @@ pub const MENUS: [(&str, &[Option<M>]); 5] = [
             Some(M::Last),
             None,
             Some(M::Branch),
+            Some(M::EditScene),
         ],
     ),
     ("Help", &[Some(M::Shortcuts), Some(M::About)]),
@@ -69,6 +73,7 @@ impl M {
     /// The entry's text; an ellipsis where more is asked for.
     pub fn title(self) -> &'static str {
         match self {
+            M::Scenes => "New episode…",
             M::OpenScene => "Open scene…",
             M::OpenEpisode => "Open episode…",
             M::Save => "Save",
@@ -89,8 +94,11 @@ impl M {
             M::Decide => "Decide",
             M::DoIt => "Do it",
             M::Run => "Run",
+            M::RunBoth => "Run both",
+            M::Pause => "Pause",
             M::Cancel => "Cancel",
             M::Branch => "Branch from here",
+            M::EditScene => "Edit a copy of the scene",
             M::Layout(layout) => layout.title(),
             M::ToggleTheme => "Light or dark",
             M::ZoomIn => "Zoom in",
@@ -104,13 +112,14 @@ impl M {
     /// What it does, in a sentence.
     pub fn tooltip(self) -> &'static str {
         match self {
-            M::OpenScene => "Choose a scene file (.toml) to start an episode of",
+            M::Scenes => "Show the scenes, to start an episode of one",
+            M::OpenScene => "Choose a scene file (.toml) to start an episode of; in the editor, to edit",
             M::OpenEpisode => "Choose an episode's directory, or a recording (.rrd), to look at or go on with",
             M::Save => "Write notes and verdicts beside the episode, or the scene that is being authored",
             M::SaveSceneAs => "Write the scene that is being authored to another file",
             M::ExportEpisode => "Write the episode with its notes as one directory and one self-contained recording",
             M::ExportTables => "Write scores, decisions and verdicts as CSV",
-            M::ExportPicture => "Write the window as a PNG",
+            M::ExportPicture => "Write the window, or a part of it, as a PNG",
             M::CloseEpisode => "Close the episode that is shown; its directory stays",
             M::Quit => "End the program; asks first if notes or a scene are not saved",
             M::Undo => "Take the last change of the scene back",
@@ -124,8 +133,11 @@ impl M {
             M::Decide => "Ask the policy what it would do next, and show what it weighed",
             M::DoIt => "Do what was decided; decides first if nothing was",
             M::Run => "Decide and act until the budget is used up",
-            M::Cancel => "Stop after the action that is under way",
+            M::RunBoth => "Run both episodes of the comparison until their budgets are used up",
+            M::Pause => "Stop after the action that is under way; Run goes on",
+            M::Cancel => "Stop now: what is being decided is not done, an action under way is finished",
             M::Branch => "Start an episode that shares the actions up to the cursor; both stay open",
+            M::EditScene => "Open a copy of this episode's scene in Author",
             M::Layout(LayoutKind::Episode) => "Belief, floor maps, score curves and the decision",
             M::Layout(LayoutKind::Why) => "The numbers, history and causes of one voxel or floor cell",
             M::Layout(LayoutKind::Gains) => "What every view would tell, in nats",
@@ -147,6 +159,7 @@ impl M {
         let shifted = |key| Some(KeyboardShortcut::new(Modifiers::COMMAND | Modifiers::SHIFT, key));
         let plain = |key| Some(KeyboardShortcut::new(Modifiers::NONE, key));
         match self {
+            M::Scenes => command(Key::N),
             M::OpenScene => command(Key::O),
             M::OpenEpisode => shifted(Key::O),
             M::Save => command(Key::S),
@@ -167,6 +180,8 @@ impl M {
             M::Decide => plain(Key::D),
             M::DoIt => plain(Key::Enter),
             M::Run => command(Key::R),
+            M::RunBoth => shifted(Key::R),
+            M::Pause => plain(Key::P),
             M::Cancel => plain(Key::Escape),
             M::Branch => command(Key::B),
             M::Layout(layout) => command(
@@ -177,6 +192,7 @@ impl M {
             M::ZoomIn => command(Key::Plus),
             M::ZoomOut => command(Key::Minus),
             M::Shortcuts => plain(Key::F1),
+            M::EditScene => shifted(Key::D),
             M::ResetLayout | M::About => None,
         }
     }
@@ -185,17 +201,22 @@ impl M {
     pub fn is_available(self, model: &Model) -> bool {
         let session = model.session();
         let idle = session.is_some_and(|session| session.activity == Activity::Idle);
-        let open = session.is_some_and(|session| session.read_only.is_none() && !session.is_finished());
+        let open = session.is_some_and(Session::is_open);
         let authoring = model.kept.layout == LayoutKind::Author;
         match self {
             M::Save => authoring || session.is_some_and(|session| session.unsaved),
             M::SaveSceneAs | M::Undo | M::Redo | M::Duplicate | M::Delete => authoring,
             M::ExportEpisode | M::ExportTables | M::CloseEpisode => session.is_some(),
             M::StepBack | M::First => session.is_some() && model.cursor > 0,
-            M::StepForward | M::Last => session.is_some_and(|session| model.cursor < session.steps()),
+            M::StepForward | M::Last => session.is_some() && model.cursor < model.last_step(),
             M::Decide | M::DoIt | M::Run => idle && open,
-            M::Cancel => session.is_some_and(|session| session.activity != Activity::Idle),
-            M::Branch => session.is_some(),
+            M::RunBoth => {
+                let can_run = |session: &Session| session.activity == Activity::Idle && session.is_open();
+                model.other_session().is_some_and(|other| can_run(other) || (idle && open))
+            }
+            M::Pause => model.runs_any(|session| session.activity == Activity::Running),
+            M::Cancel => model.runs_any(|session| session.activity != Activity::Idle),
+            M::Branch | M::EditScene => session.is_some(),
             _ => true,
         }
     }

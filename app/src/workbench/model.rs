@@ -151,6 +151,8 @@ pub struct StartForm {
     pub budget: usize,
     /// The planner's numbers.
     pub planner: PlannerSettings,
+    /// A second policy to run side by side with the first.
+    pub against: Option<PolicyKind>,
 }
 
 impl Default for StartForm {
@@ -162,6 +164,7 @@ impl Default for StartForm {
             seed: 0,
             budget: 20,
             planner: PlannerSettings::default(),
+            against: None,
         }
     }
 }
@@ -188,6 +191,16 @@ pub struct GainSource {
     pub view: ViewId,
     /// Nats by voxel.
     pub nats: Arc<Vec<(usize, f32)>>,
+    /// The top of the colour scale, nats; see `gain_top` in the recording's voxels.
+    pub top: f32,
+}
+
+impl GainSource {
+    /// The gain of a view under the belief after a step of an episode, by voxel in nats.
+    pub fn new(of: (SessionId, usize), view: ViewId, nats: Vec<(usize, f32)>) -> Self {
+        let top = crate::record::voxels::gain_top(&nats);
+        Self { of, view, nats: Arc::new(nats), top }
+    }
 }
 
 /// What is remembered from one start of the program to the next.
@@ -233,6 +246,10 @@ pub struct Model {
     pub gain_source: Option<GainSource>,
     /// Floor maps and full-precision beliefs of the states that are shown, made in the background.
     pub derived: BTreeMap<(SessionId, usize), Arc<Derived>>,
+    /// Whether the scenes to choose from are shown in place of the episode.
+    pub browsing: bool,
+    /// The port at 127.0.0.1 where other viewers may look on.
+    pub serving: Option<u16>,
     /// A foreign recording that is shown in place of the episode.
     pub recording: Option<PathBuf>,
     /// States whose maps are being made.
@@ -263,6 +280,9 @@ impl Model {
     /// Shows an open episode at its last state. What was chosen in another one is let go.
     pub fn show(&mut self, id: SessionId) {
         if self.shown != Some(id) {
+            if self.other == Some(id) {
+                self.other = self.shown;
+            }
             (self.picked, self.view, self.candidate) = (None, None, None);
             self.hovered = Hovered::Nothing;
         }
@@ -292,6 +312,22 @@ impl Model {
     /// The second episode of the comparison.
     pub fn other_session(&self) -> Option<&Session> {
         self.session_of(self.other?)
+    }
+
+    /// The episodes that are on the window: the shown one, and in a comparison the second one.
+    pub fn on_show(&self) -> impl Iterator<Item = &Session> {
+        let other = self.other_session().filter(|_| self.kept.layout == LayoutKind::Compare);
+        self.session().into_iter().chain(other)
+    }
+
+    /// The last step that the cursor can go to: of a comparison, the longer episode's.
+    pub fn last_step(&self) -> usize {
+        self.on_show().map(Session::steps).max().unwrap_or(0)
+    }
+
+    /// Whether one of the episodes on the window is at something.
+    pub fn runs_any(&self, is: impl Fn(&Session) -> bool) -> bool {
+        self.on_show().any(is)
     }
 
     /// The state at the cursor.

@@ -86,6 +86,37 @@ fn empty(ui: &mut egui::Ui, text: &str) {
     });
 }
 
+/// Which way an arrow key was pressed on a widget that has the keyboard's focus: to the right and up are positive; by ten
+/// with shift.
+fn arrows(ui: &egui::Ui, response: &egui::Response) -> Option<[i32; 2]> {
+    if !response.has_focus() {
+        return None;
+    }
+    let filter = egui::EventFilter { horizontal_arrows: true, vertical_arrows: true, ..Default::default() };
+    ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
+    let ways = [
+        (egui::Key::ArrowLeft, [-1, 0]),
+        (egui::Key::ArrowRight, [1, 0]),
+        (egui::Key::ArrowDown, [0, -1]),
+        (egui::Key::ArrowUp, [0, 1]),
+    ];
+    ui.input_mut(|input| {
+        let by = if input.modifiers.shift { 10 } else { 1 };
+        let pressed = ways.into_iter().find(|(key, _)| input.consume_key(egui::Modifiers::NONE, *key));
+        pressed.map(|(_, [x, y])| [x * by, y * by])
+    })
+}
+
+/// Gives the buttons that follow in `ui` a ground, so that what can be pressed looks like it.
+fn framed(ui: &mut egui::Ui) {
+    let visuals = ui.visuals_mut();
+    let ground = visuals.text_color().gamma_multiply(0.14);
+    for state in [&mut visuals.widgets.inactive, &mut visuals.widgets.noninteractive] {
+        state.weak_bg_fill = ground;
+        state.bg_fill = ground;
+    }
+}
+
 /// The heading of a part of a panel; the tooltip says what it is.
 fn heading(ui: &mut egui::Ui, title: impl Into<String>, hint: &str) -> egui::Response {
     let heading = ui.label(egui::RichText::new(title).strong());

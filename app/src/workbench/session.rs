@@ -118,6 +118,11 @@ impl Session {
         self.steps() >= self.record.config.budget
     }
 
+    /// Whether something more can be done in it.
+    pub fn is_open(&self) -> bool {
+        self.read_only.is_none() && !self.is_finished()
+    }
+
     /// The state after `step` actions, or the last one there is.
     pub fn moment(&self, step: usize) -> &Arc<Moment> {
         &self.moments[step.min(self.moments.len() - 1)]

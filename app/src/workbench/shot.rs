@@ -20,8 +20,8 @@ pub struct Shot {
     pub with: Option<PathBuf>,
     /// Number of actions after which it is shown; the last state unless told.
     pub step: Option<usize>,
-    /// The layout.
-    pub layout: LayoutKind,
+    /// The layouts, one picture of each.
+    pub layouts: Vec<LayoutKind>,
     /// Width and height, points.
     pub size: [u32; 2],
     /// Pixels per point.
@@ -35,13 +35,15 @@ const PATIENCE: Duration = Duration::from_secs(300);
 /// Frames after everything is done, so that what was logged is drawn and animations have ended.
 const CALM_FRAMES: usize = 25;
 
-/// Renders the window. New episodes go to `out`, a folder of the caller's.
+/// Renders the window, once for every layout that is asked for. New episodes go to `out`, a folder of the caller's.
 ///
 /// # Errors
 /// When the file cannot be opened, or there is no graphics driver, not even a software one.
-pub fn shoot(shot: &Shot, out: PathBuf) -> Result<RgbImage> {
-    let options =
-        Options { out, light: Some(shot.light), layout: Some(shot.layout), look_only: true, ..Options::default() };
+pub fn shoot(shot: &Shot, out: PathBuf) -> Result<Vec<(LayoutKind, RgbImage)>> {
+    // A scene is opened in the editor if nothing but the editor shall be on the pictures; else it starts an episode.
+    let first = shot.layouts.iter().copied().find(|layout| *layout != LayoutKind::Author);
+    let layout = Some(first.unwrap_or(LayoutKind::Author));
+    let options = Options { out, light: Some(shot.light), layout, look_only: true, ..Options::default() };
     let [width, height] = shot.size.map(|n| n as f32);
     let setup = re_viewer::native::eframe_options(None).wgpu_options.wgpu_setup;
     let mut harness = Harness::<App>::builder()
@@ -62,13 +64,27 @@ pub fn shoot(shot: &Shot, out: PathBuf) -> Result<RgbImage> {
         }
         harness.state_mut().ask(Command::CompareWith(second));
     }
-    harness.state_mut().ask(Command::Layout(shot.layout));
-    choose(harness.state_mut(), shot);
-    settle(&mut harness)?;
-    explain(harness.state_mut(), shot.layout);
-    settle(&mut harness)?;
-    let picture = harness.render().map_err(Error::Usage)?;
-    Ok(image::DynamicImage::ImageRgba8(picture).into_rgb8())
+    let mut pictures = Vec::with_capacity(shot.layouts.len());
+    for &layout in &shot.layouts {
+        lay_out(harness.state_mut(), layout);
+        choose(harness.state_mut(), shot.step, layout);
+        settle(&mut harness)?;
+        explain(harness.state_mut(), layout);
+        settle(&mut harness)?;
+        let picture = harness.render().map_err(Error::Usage)?;
+        pictures.push((layout, image::DynamicImage::ImageRgba8(picture).into_rgb8()));
+    }
+    Ok(pictures)
+}
+
+/// Shows a layout as if it were the first: nothing is chosen in it yet.
+fn lay_out(app: &mut App, layout: LayoutKind) {
+    let model = &mut app.model;
+    (model.picked, model.view, model.candidate, model.preview) = (None, None, None, None);
+    if layout == LayoutKind::Author && model.author.scene().objects.is_empty() {
+        app.ask(Command::EditScene);
+    }
+    app.ask(Command::Layout(layout));
 }
 
 /// Opens a file and waits until it is there; what went wrong is the toast's text.
@@ -77,7 +93,8 @@ fn open(harness: &mut Harness<'_, App>, path: &std::path::Path) -> Result<()> {
     harness.state_mut().ask(Command::Open(path.to_owned()));
     settle(harness)?;
     let app = harness.state_mut();
-    if app.model.sessions.len() > before || app.model.kept.layout == LayoutKind::Author {
+    let edited = app.model.kept.layout == LayoutKind::Author && app.model.author.path().is_some();
+    if app.model.sessions.len() > before || edited {
         return Ok(());
     }
     let said = app.model.toasts.shown().last().map(|toast| toast.text.clone());
@@ -100,13 +117,16 @@ fn settle(harness: &mut Harness<'_, App>) -> Result<()> {
 }
 
 /// Moves the cursor; without a step to where the layout has most to show.
-fn choose(app: &mut App, shot: &Shot) {
+fn choose(app: &mut App, step: Option<usize>, layout: LayoutKind) {
     let Some(session) = app.model.session() else { return };
     let before_push = session.moments.iter().rev().find_map(|moment| {
         let pushed = matches!(moment.outcome.as_ref()?.record.action, Action::Push(_));
         pushed.then(|| moment.step - 1)
     });
-    let step = shot.step.or(before_push.filter(|_| shot.layout == LayoutKind::Push)).unwrap_or(session.steps());
+    // The last state of a finished episode has no decision to show; the one before it has.
+    let explains = matches!(layout, LayoutKind::Episode | LayoutKind::Gains | LayoutKind::Push);
+    let last = session.steps() - usize::from(explains && session.is_finished() && session.steps() > 0);
+    let step = step.or(before_push.filter(|_| layout == LayoutKind::Push)).unwrap_or(last);
     let undecided = session.decision_after(step).is_none() && !session.is_finished() && session.read_only.is_none();
     app.ask(Command::GoTo(step));
     if undecided {

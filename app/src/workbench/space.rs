@@ -10,6 +10,7 @@ use super::session::{Moment, SessionId, Setup};
 use super::{space_layout, viewer};
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture;
+use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::{colored, surface};
 use nudge_core::belief::{Belief, bernoulli_entropy, beta_mean};
@@ -24,23 +25,41 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Entities of the window's recording.
 pub mod at {
+    /// The panels of the shelf.
     pub const SHELF: &str = "shelf/panels";
+    /// Its edges.
     pub const EDGES: &str = "shelf/edges";
+    /// The true objects as glass.
     pub const OBJECTS: &str = "objects";
+    /// The belief of the shown episode.
     pub const BELIEF: &str = "belief";
+    /// The candidate views.
     pub const VIEWS: &str = "camera/views";
+    /// The view that was looked from last.
     pub const CURRENT: &str = "camera/current";
+    /// The push candidates.
     pub const CANDIDATES: &str = "push/candidates";
+    /// The push that was done or is looked at.
     pub const CHOSEN: &str = "push/chosen";
+    /// What it sweeps.
     pub const SWEPT: &str = "push/swept";
+    /// The belief that it is predicted to leave.
     pub const PREDICTED: &str = "push/predicted";
+    /// How that differs from now.
     pub const DIFFERENCE: &str = "push/difference";
+    /// What it really left.
     pub const HAPPENED: &str = "push/happened";
+    /// Where a gain comes from.
     pub const GAIN: &str = "gain";
+    /// The belief of the second episode.
     pub const OTHER: &str = "other/belief";
+    /// Its true objects.
     pub const OTHER_OBJECTS: &str = "other/objects";
+    /// How the two beliefs differ.
     pub const BETWEEN: &str = "between";
+    /// What the pointer is over.
     pub const HOVERED: &str = "pointer/hovered";
+    /// What is asked about.
     pub const PICKED: &str = "pointer/picked";
 }
 
@@ -79,6 +98,10 @@ impl Side {
 pub struct Space {
     /// The layout.
     pub layout: LayoutKind,
+    /// Width over height of the place for the three-dimensional views.
+    pub aspect: f32,
+    /// Whether the window is light.
+    pub light: bool,
     /// The episode that is shown.
     pub side: Option<Side>,
     /// The second one of a comparison.
@@ -99,9 +122,11 @@ pub struct Space {
     pub gain: Option<GainSource>,
 }
 
+type VoxelsOf = BTreeMap<&'static str, Arc<Vec<usize>>>;
+
 /// Which voxel every drawn instance of an entity is.
 #[derive(Clone, Default)]
-pub struct Drawn(Arc<Mutex<BTreeMap<&'static str, Arc<Vec<usize>>>>>);
+pub struct Drawn(Arc<Mutex<VoxelsOf>>);
 
 impl Drawn {
     /// The voxel of an instance.
@@ -125,8 +150,8 @@ impl Drawn {
 pub struct Painter {
     stream: RecordingStream,
     drawn: Drawn,
-    /// The views that are there.
-    layout: Option<LayoutKind>,
+    /// The views that are there, how far from the shelf their eyes began, and their ground.
+    layout: Option<(LayoutKind, f32, Ground)>,
     /// What every entity was last drawn from, as words.
     keys: BTreeMap<&'static str, String>,
     /// The last beliefs in full precision.
@@ -141,8 +166,9 @@ impl Painter {
 
     /// Logs what differs from the last call.
     pub fn paint(&mut self, space: &Space) {
-        if let Some((views, layout)) = space_layout::of(space.layout)
-            && self.layout.replace(views) != Some(views)
+        let ground = if space.light { Ground::Light } else { Ground::Dark };
+        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect, ground)
+            && self.layout.replace((views, distance, ground)) != Some((views, distance, ground))
             && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
         {
             eprintln!("warning: layout: {error}");

@@ -3,13 +3,35 @@
 use super::model::LayoutKind;
 use super::space::at;
 use crate::record::blueprint::{Layout, Part};
-use crate::record::layout::spatial;
+use crate::record::layout::{Eye, Ground, spatial};
 
-/// The views of a layout, and the first layout that has the same ones; `None` where it has none.
-pub fn of(layout: LayoutKind) -> Option<(LayoutKind, Layout)> {
+/// Width over height from which on a view shows the whole shelf with the eye where it is by default.
+const WHOLE_SHELF: f32 = 1.05;
+
+/// How far the eye has to be for the whole shelf to show in a view, as a factor of where it is by default; in coarse
+/// steps, so that a window that is made a little wider leaves the eye where a person has turned it.
+fn distance(aspect: f32) -> f32 {
+    const STEP: f32 = 1.1;
+    let needed = (WHOLE_SHELF / aspect.clamp(0.2, 5.0)).max(1.0);
+    STEP.powf((needed.ln() / STEP.ln()).ceil())
+}
+
+/// The views of a layout with the first layout that has the same ones, and the distance of their eyes; `None` where it
+/// has none. `aspect` is width over height of the place for all of them together.
+pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground) -> Option<(LayoutKind, f32, Layout)> {
+    let distance = distance(match layout {
+        LayoutKind::Compare => aspect / 3.0,
+        _ => aspect,
+    });
     let always = [at::SHELF, at::EDGES];
     let view = |name: &str, shown: &[&str]| {
-        Part::View(spatial(name, "", always.iter().chain(shown).map(|path| format!("/{path}")).collect()))
+        Part::View(spatial(
+            name,
+            "",
+            Eye::SHELF.farther(distance),
+            ground,
+            always.iter().chain(shown).map(|path| format!("/{path}")).collect(),
+        ))
     };
     let pointer = [at::HOVERED, at::PICKED];
     let root = match layout {
@@ -48,5 +70,5 @@ pub fn of(layout: LayoutKind) -> Option<(LayoutKind, Layout)> {
         LayoutKind::Author => return None,
     };
     let same = if layout == LayoutKind::Why { LayoutKind::Episode } else { layout };
-    Some((same, Layout { root }))
+    Some((same, distance, Layout { root }))
 }

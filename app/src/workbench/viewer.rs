@@ -1,19 +1,30 @@
 //! Rerun's viewer inside the window: the only place that touches `re_viewer`.
 //!
-//! It is fed in memory by a [`rerun::RecordingStream`] and opens no port. Its own panels are hidden; what a person
+//! It is fed in memory by a [`rerun::RecordingStream`] and opens no port, unless it is asked to serve: then other viewers
+//! on this machine can look on, at 127.0.0.1 only. Its own panels are hidden; what a person
 //! clicks on comes back through [`Viewer::clicked`].
 
 mod linked;
 
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
+use rerun::external::re_viewer::external::re_ui::{
+    RecordingCommand, RecordingCommandKind, RecordingCommandSender as _,
+};
 use rerun::external::{eframe, egui, re_log_channel, re_log_types, re_viewer, tokio};
+use rerun::grpc_server::GrpcServerSink;
+use rerun::sink::LogSink as _;
 use rerun::{RecordingStream, RecordingStreamBuilder};
 use std::cell::RefCell;
 use std::path::Path;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// The application id of the window's own recording; layouts of shared recordings go by another.
 pub const APPLICATION: &str = "nudge_workbench";
+
+/// Where it serves: this machine and no other.
+pub const LOOPBACK: &str = "127.0.0.1";
 
 /// What was clicked on in three dimensions.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,16 +39,19 @@ pub struct Clicked {
 pub struct Viewer {
     app: re_viewer::App,
     clicked: Rc<RefCell<Option<Clicked>>>,
+    /// Whether a foreign recording is shown, which the viewer's own keys play.
+    is_foreign: Arc<AtomicBool>,
     /// Dropped last: the viewer's own tasks run on it.
     _runtime: tokio::runtime::Runtime,
 }
 
 impl Viewer {
-    /// Sets the viewer up in a window that draws with wgpu, and gives back the stream that it shows.
+    /// Sets the viewer up in a window that draws with wgpu, and gives back the stream that it shows. With a port, what is
+    /// shown is served there as well.
     ///
     /// # Errors
     /// When there is no graphics driver that it can use.
-    pub fn new(cc: &eframe::CreationContext<'_>) -> Result<(Self, RecordingStream), String> {
+    pub fn new(cc: &eframe::CreationContext<'_>, serve: Option<u16>) -> Result<(Self, RecordingStream), String> {
         re_viewer::customize_eframe_and_setup_renderer(cc).map_err(|error| error.to_string())?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
@@ -45,9 +59,11 @@ impl Viewer {
             .build()
             .map_err(|error| error.to_string())?;
         let clicked = Rc::new(RefCell::new(None));
-        let mut options = re_viewer::StartupOptions::default();
-        options.persist_state = false;
-        options.hide_welcome_screen = true;
+        let mut options = re_viewer::StartupOptions {
+            persist_state: false,
+            hide_welcome_screen: true,
+            ..re_viewer::StartupOptions::default()
+        };
         options.panel_state_overrides.top = Some(PanelState::Hidden);
         options.panel_state_overrides.blueprint = Some(PanelState::Hidden);
         options.panel_state_overrides.selection = Some(PanelState::Hidden);
@@ -58,6 +74,20 @@ impl Viewer {
                 *heard.borrow_mut() = items.iter().find_map(clicked_of);
             }
         }));
+        // The viewer takes the space bar, arrows, Home and End as soon as a frame begins. Around its hook, so in the order
+        // in which they are made, two of ours take the keys away and give them back.
+        let is_foreign = Arc::new(AtomicBool::new(false));
+        let held: Arc<Mutex<Vec<egui::Event>>> = Arc::default();
+        let (hold, foreign) = (held.clone(), is_foreign.clone());
+        cc.egui_ctx.on_begin_pass(
+            "nudge holds its keys",
+            Arc::new(move |ctx| {
+                if !foreign.load(Ordering::Relaxed) {
+                    let keys = ctx.input_mut(|input| std::mem::take(&mut input.events));
+                    *hold.lock().unwrap_or_else(PoisonError::into_inner) = keys;
+                }
+            }),
+        );
         let _entered = runtime.enter();
         let mut app = re_viewer::App::new(
             re_viewer::MainThreadToken::i_promise_i_am_on_the_main_thread(),
@@ -68,6 +98,16 @@ impl Viewer {
             None,
             re_viewer::AsyncRuntimeHandle::new_native(runtime.handle().clone()),
         );
+        cc.egui_ctx.on_begin_pass(
+            "nudge has its keys back",
+            Arc::new(move |ctx| {
+                let mut held = std::mem::take(&mut *held.lock().unwrap_or_else(PoisonError::into_inner));
+                ctx.input_mut(|input| {
+                    held.append(&mut input.events);
+                    input.events = held;
+                });
+            }),
+        );
         app.app_options_mut().custom_window_decorations = false;
         app.extend_view_class(linked::class(), |registrator| {
             registrator.register_context_system::<linked::LinkedEyes>()
@@ -75,9 +115,9 @@ impl Viewer {
         .map_err(|error| error.to_string())?;
         let (sender, receiver) = re_log_channel::log_channel(re_log_channel::LogSource::Sdk);
         app.add_log_receiver(receiver);
-        let stream = stream_into(sender).map_err(|error| error.to_string())?;
+        let stream = stream_into(sender, serve).map_err(|error| error.to_string())?;
         drop(_entered);
-        Ok((Self { app, clicked, _runtime: runtime }, stream))
+        Ok((Self { app, clicked, is_foreign, _runtime: runtime }, stream))
     }
 
     /// Takes in what was logged. To be called every frame, before [`Viewer::ui`].
@@ -91,7 +131,16 @@ impl Viewer {
     pub fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let _entered = self._runtime.handle().clone();
         let _entered = _entered.enter();
+        // Its shortcuts open panels and palettes of its own: of the keys it sees only those that are held down, by which
+        // a camera moves.
+        let foreign = self.is_foreign.load(Ordering::Relaxed);
+        let before = ui.input_mut(|input| {
+            let before = input.events.clone();
+            input.events.retain(|event| foreign || !matches!(event, egui::Event::Key { .. }));
+            before
+        });
         eframe::App::ui(&mut self.app, ui, frame);
+        ui.input_mut(|input| input.events = before);
     }
 
     /// What was clicked on since the last call.
@@ -101,11 +150,20 @@ impl Viewer {
 
     /// Shows a recording in place of the window's own.
     pub fn open_recording(&mut self, path: &Path) {
+        self.is_foreign.store(true, Ordering::Relaxed);
         self.app.open_url_or_file(&path.to_string_lossy());
     }
 
-    /// Goes back to the window's own recording: closes every other one.
+    /// Moves the time of the recording that is shown, as the viewer's own keys would.
+    pub fn play(&mut self, kind: RecordingCommandKind) {
+        if let Some(recording_id) = self.app.active_recording_id().cloned() {
+            self.app.command_sender.send_recording_command(RecordingCommand { recording_id, kind });
+        }
+    }
+
+    /// Goes back to the window's own recording.
     pub fn close_recording(&mut self) {
+        self.is_foreign.store(false, Ordering::Relaxed);
         use rerun::external::re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
         let own = re_log_types::ApplicationId::from(APPLICATION);
         self.app.command_sender.send_system(SystemCommand::ActivateApp(own));
@@ -124,12 +182,17 @@ fn clicked_of(item: &re_viewer::SelectionChangeItem) -> Option<Clicked> {
 
 /// A stream whose messages go straight into the viewer. Its sender may block, so nothing may be flushed on the window's
 /// own thread, which is the one that takes messages out.
-fn stream_into(sender: re_log_channel::LogSender) -> rerun::RecordingStreamResult<RecordingStream> {
+fn stream_into(sender: re_log_channel::LogSender, serve: Option<u16>) -> rerun::RecordingStreamResult<RecordingStream> {
     let (stream, _) = RecordingStreamBuilder::new(APPLICATION).send_properties(false).memory()?;
     stream.set_log_time_enabled(false);
     stream.set_log_tick_enabled(false);
+    // The address is a constant: there is nothing in it that could not be read.
+    let served = serve.and_then(|port| GrpcServerSink::new(LOOPBACK, port, rerun::ServerOptions::default()).ok());
     stream.set_sink(Box::new(rerun::sink::CallbackSink::new(move |messages: &[re_log_types::LogMsg]| {
         for message in messages {
+            if let Some(served) = &served {
+                served.send(message.clone());
+            }
             // The viewer is gone once the window is closed.
             let _ = sender.send(message.clone().into());
         }

@@ -1,10 +1,12 @@
 //! An episode's worker: the thread that owns its [`Driver`], takes orders and sends events.
 //!
-//! The window never waits for it. A panic inside an order becomes an [`Event::Panicked`]; what was written to the
+//! The window never waits for it while it is open; [`super::threads`] waits once it is closed. A panic inside an order becomes an [`Event::Panicked`]; what was written to the
 //! episode's directory until then is whole.
 
 use super::half_belief::HalfBelief;
+use super::latest::words_of;
 use super::session::{Activity, Moment, SessionId, Setup};
+use super::threads::Threads;
 use crate::driver::Driver;
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, hidden_objects};
@@ -13,7 +15,6 @@ use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
 use nudge_core::tool::Tool;
 use nudge_core::{Error, Result};
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -55,8 +56,21 @@ pub enum Order {
     Decide,
     /// Do it; answers with [`Event::Stepped`].
     Act(Arc<Decision>),
-    /// Decide and act until the budget is used up or [`Worker::cancel`] is called.
+    /// Decide and act until the budget is used up, or [`Worker::pause`] or [`Worker::cancel`] is called.
     Run,
+    /// Break down.
+    #[cfg(test)]
+    Break,
+}
+
+impl Begin {
+    /// The directory that it writes.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Start { out, .. } | Self::Branch { out, .. } => out,
+            Self::Open { path, .. } => path,
+        }
+    }
 }
 
 /// What a worker tells.
@@ -89,49 +103,79 @@ pub struct Opened {
     pub read_only: Option<String>,
 }
 
-/// Wakes the window up, after an event was sent.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
+pub use super::latest::Wake;
+
+/// What stops a worker before it has done all that it was told.
+#[derive(Default)]
+struct Brake {
+    /// Stop after the action that is under way.
+    paused: AtomicBool,
+    /// Stop as soon as can be; what has been decided is not done.
+    cancelled: AtomicBool,
+}
+
+impl Brake {
+    fn is_paused(&self) -> bool {
+        self.paused.load(Ordering::Relaxed) || self.is_cancelled()
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}
 
 /// The window's end of a worker.
 pub struct Worker {
     orders: Sender<Order>,
-    cancelled: Arc<AtomicBool>,
+    brake: Arc<Brake>,
 }
 
 impl Worker {
-    /// Starts the thread. Events carry the id, so that all workers can share a channel.
+    /// Starts the thread, which `threads` remembers. Events carry the id, so that all workers can share a channel.
     pub fn spawn(
         id: SessionId,
         begin: Begin,
         catalog: Arc<Catalog>,
         events: Sender<(SessionId, Event)>,
         wake: Wake,
+        threads: &Threads,
     ) -> Self {
         let (orders, inbox) = channel();
-        let cancelled = Arc::new(AtomicBool::new(false));
+        let brake = Arc::new(Brake::default());
         let post = Post { id, events, wake };
-        let flag = cancelled.clone();
-        std::thread::Builder::new()
+        let own = brake.clone();
+        let path = begin.path().to_owned();
+        // An episode that was closed a moment ago may still be ending its recording.
+        let before = threads.take(&path);
+        let thread = std::thread::Builder::new()
             .name(format!("episode {}", id.0))
             .spawn(move || {
-                let broke = catch_unwind(AssertUnwindSafe(|| work(begin, catalog, &inbox, &post, &flag)));
+                before.into_iter().for_each(|thread| drop(thread.join()));
+                let broke = catch_unwind(AssertUnwindSafe(|| work(begin, catalog, &inbox, &post, &own)));
                 if let Err(panic) = broke {
                     post.send(Event::Panicked(words_of(&*panic)));
                 }
             })
             .expect("a thread can be started");
-        Self { orders, cancelled }
+        threads.add(&path, thread);
+        Self { orders, brake }
     }
 
     /// Gives an order; one that comes after a breakdown is lost.
     pub fn order(&self, order: Order) {
-        self.cancelled.store(false, Ordering::Relaxed);
+        self.brake.paused.store(false, Ordering::Relaxed);
+        self.brake.cancelled.store(false, Ordering::Relaxed);
         let _ = self.orders.send(order);
     }
 
-    /// Stops a run after its step, or an opening.
+    /// Stops a run after the action that it is at.
+    pub fn pause(&self) {
+        self.brake.paused.store(true, Ordering::Relaxed);
+    }
+
+    /// Stops a run without doing what it decides just now, or an opening.
     pub fn cancel(&self) {
-        self.cancelled.store(true, Ordering::Relaxed);
+        self.brake.cancelled.store(true, Ordering::Relaxed);
     }
 }
 
@@ -155,20 +199,14 @@ impl Post {
     }
 }
 
-/// A panic's own words.
-pub(super) fn words_of(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
-    text.unwrap_or("no reason was given").to_owned()
-}
-
 /// An episode that goes on, or one that can only be looked at.
 enum Track {
     Writing(Box<Driver>),
     Reading,
 }
 
-fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Post, cancelled: &AtomicBool) {
-    let (mut track, mut latest) = match open(begin, catalog, post, cancelled) {
+fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Post, brake: &Brake) {
+    let (mut track, mut latest) = match open(begin, catalog, post, brake) {
         Ok((track, opened)) => {
             let latest = opened.moments.last().expect("there is a prior").clone();
             post.send(Event::Opened(Box::new(opened)));
@@ -192,7 +230,9 @@ fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Pos
                 post.send(Event::Activity(Activity::Acting));
                 act(driver, (*decision).clone(), &mut latest, post)
             }
-            Order::Run => run(driver, &mut latest, post, cancelled),
+            Order::Run => run(driver, &mut latest, post, brake),
+            #[cfg(test)]
+            Order::Break => panic!("a broken order"),
         };
         if let Err(error) = done {
             post.send(Event::Failed(error.to_string()));
@@ -207,12 +247,12 @@ fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Pos
     }
 }
 
-fn run(driver: &mut Driver, latest: &mut Arc<Moment>, post: &Post, cancelled: &AtomicBool) -> Result<()> {
-    while !driver.episode().is_finished() && !cancelled.load(Ordering::Relaxed) {
+fn run(driver: &mut Driver, latest: &mut Arc<Moment>, post: &Post, brake: &Brake) -> Result<()> {
+    while !driver.episode().is_finished() && !brake.is_paused() {
         post.send(Event::Activity(Activity::Running));
         let decision = driver.decide();
         post.send(Event::Decided(Arc::new(decision.clone())));
-        if cancelled.load(Ordering::Relaxed) {
+        if brake.is_cancelled() {
             break;
         }
         act(driver, decision, latest, post)?;
@@ -245,7 +285,7 @@ fn update_named(name: &str, config: &EpisodeConfig) -> Result<Arc<dyn BeliefUpda
     Ok(crate::driver::belief_update(Some(name), config.policy)?.0)
 }
 
-fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool) -> Result<(Track, Opened)> {
+fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Result<(Track, Opened)> {
     match begin {
         Begin::Start { scene, config, out } => {
             let update = update_named(&config.belief, &config)?;
@@ -259,7 +299,7 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool
             let mut driver = Driver::start(of.scene, catalog, of.config, update, &out, Overwrite::Refuse)?;
             let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
             for (done, step) in of.steps.into_iter().take(steps).enumerate() {
-                progress(post, cancelled, done, steps)?;
+                progress(post, brake, done, steps)?;
                 let outcome = driver.act(step.decision)?;
                 let next = moment(driver.episode(), Some(outcome), moments.last().map(|moment| &**moment));
                 moments.push(Arc::new(next));
@@ -273,12 +313,12 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool
             let of = record.steps.len();
             let mut moments = Vec::with_capacity(of + 1);
             if look_only {
-                let episode = review(&path, catalog, update, &mut watch(post, cancelled, of, &mut moments))?;
+                let episode = review(&path, catalog, update, &mut watch(post, brake, of, &mut moments))?;
                 let reason = Some("nothing in its directory shall change".to_owned());
                 return Ok((Track::Reading, opened(&path, &episode, moments, reason)?));
             }
             let resumed =
-                Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, cancelled, of, &mut moments));
+                Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, brake, of, &mut moments));
             match resumed {
                 Ok(driver) => {
                     let opened = opened(&path, driver.episode(), moments, None)?;
@@ -287,7 +327,7 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool
                 Err(refused @ (Error::Io { .. } | Error::Input { .. })) => {
                     // A directory that cannot be written, or that another run is writing, can still be looked at.
                     moments.clear();
-                    let episode = review(&path, catalog, update, &mut watch(post, cancelled, of, &mut moments))?;
+                    let episode = review(&path, catalog, update, &mut watch(post, brake, of, &mut moments))?;
                     Ok((Track::Reading, opened(&path, &episode, moments, Some(refused.to_string()))?))
                 }
                 Err(error) => Err(error),
@@ -299,20 +339,20 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, cancelled: &AtomicBool
 /// Keeps every state of an episode that is being repeated, and tells how far it is.
 fn watch<'a>(
     post: &'a Post,
-    cancelled: &'a AtomicBool,
+    brake: &'a Brake,
     of: usize,
     moments: &'a mut Vec<Arc<Moment>>,
 ) -> impl FnMut(&Episode, Option<&StepOutcome>) -> Result<()> + 'a {
     move |episode, outcome| {
-        progress(post, cancelled, episode.record().steps.len(), of)?;
+        progress(post, brake, episode.record().steps.len(), of)?;
         let next = moment(episode, outcome.cloned(), moments.last().map(|moment| &**moment));
         moments.push(Arc::new(next));
         Ok(())
     }
 }
 
-fn progress(post: &Post, cancelled: &AtomicBool, done: usize, of: usize) -> Result<()> {
-    if cancelled.load(Ordering::Relaxed) {
+fn progress(post: &Post, brake: &Brake, done: usize, of: usize) -> Result<()> {
+    if brake.is_cancelled() {
         return Err(Error::Usage("cancelled".to_owned()));
     }
     post.send(Event::Activity(Activity::Opening { done, of }));

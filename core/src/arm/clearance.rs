@@ -1,13 +1,16 @@
 //! How much room an arm has in a configuration, and what is in its way.
 
 use super::model::{Part, Role};
-use super::space::{MAP_MARGIN_M, MapObstacles, PANELS, SHELF_MARGIN_M, Space};
+use super::space::{Gripper, MAP_MARGIN_M, MapObstacles, PANELS, SHELF_MARGIN_M, Space};
 use super::{Ball, Frame, Joints};
 use nalgebra::Point3;
 use serde::{Deserialize, Serialize};
 
 /// Room beyond this is not told apart, metres.
-const PLENTY_M: f64 = 0.10;
+const PLENTY_M: f64 = 0.06;
+/// The balls of two links stick out of them by about this much together, metres, which the arm's own links need not keep
+/// from each other.
+const OVERSHOOT_M: f64 = 0.010;
 
 /// What an arm meets.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -20,14 +23,15 @@ pub enum Obstacle {
     },
     /// A panel of the shelf.
     Shelf {
-        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`.
+        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`, or `inside` where nothing of it may be entered.
         panel: String,
     },
     /// The table that the arm stands on.
     Table,
     /// The arm itself.
     Arm {
-        /// The other link.
+        /// The other link. In files it has a name of its own: a [`Hit`] has a link beside it.
+        #[serde(rename = "other_link")]
         link: String,
     },
 }
@@ -74,7 +78,7 @@ impl Placed {
 
 impl Space<'_> {
     /// How far every point of the arm may at least move before anything is touched or a margin is broken, metres, at
-    /// most a decimetre. Zero or less where the arm may not be.
+    /// most 6 cm. Zero or less where the arm may not be.
     pub fn room_m(&self, joints: &Joints) -> f64 {
         self.measure(joints, PLENTY_M, |_, _| ())
     }
@@ -120,26 +124,32 @@ impl Space<'_> {
                     least = note(above(&ball), Met::Table);
                 }
             }
-            for (panel, slab) in self.panels.iter().enumerate() {
-                let gap = |ball: &Placed| slab.distance_m(&ball.center) - ball.radius_m - SHELF_MARGIN_M;
-                if gap(&whole) < least {
-                    for ball in balls() {
-                        least = note(gap(&ball), Met::Panel(panel));
-                    }
-                }
+            // Most of the arm is far before the shelf most of the time.
+            let beside = |ball: &Placed, least: f64| {
+                self.outer.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M.max(SHELF_MARGIN_M) < least
+            };
+            if !beside(&whole, least) {
+                continue;
             }
-            if let Some(map) = &self.map
-                && map.field.distance_m(&whole.center) - whole.radius_m - MAP_MARGIN_M < least
-            {
-                for ball in balls() {
-                    let distance = self.map_distance_m(map, &ball, part.role);
-                    least = note(distance - ball.radius_m - MAP_MARGIN_M, Met::Map(ball.center));
+            let map = self.map.as_ref().filter(|map| part.role == Role::Link || map.gripper == Gripper::KeepsAway);
+            for ball in balls() {
+                if !beside(&ball, least) {
+                    continue;
+                }
+                for (panel, slab) in self.panels.iter().enumerate() {
+                    let gap = slab.distance_m(&ball.center) - ball.radius_m - SHELF_MARGIN_M;
+                    least = note(gap, Met::Panel(panel));
+                }
+                if let Some(map) = map {
+                    let gap = map.field.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M;
+                    least = note(gap, Met::Map(ball.center));
                 }
             }
         }
         for &[a, b] in &self.arm.self_pairs {
             // Both sides may move, so each may use half of the gap.
-            let ([body_a, part_a], [body_b, part_b]) = (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
+            let ([body_a, part_a], [body_b, part_b]) =
+                (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
             let (first, second): (&Part, &Part) = (&self.arm.bodies[body_a][part_a], &self.arm.bodies[body_b][part_b]);
             let whole = Placed::of(&second.around, &poses[body_b]);
             if Placed::of(&first.around, &poses[body_a]).gap_m(&whole) >= 2.0 * room {
@@ -150,7 +160,7 @@ impl Space<'_> {
                     continue;
                 }
                 for of_b in second.balls.iter().map(|ball| Placed::of(ball, &poses[body_b])) {
-                    let value = 0.5 * of_a.gap_m(&of_b);
+                    let value = 0.5 * (of_a.gap_m(&of_b) + OVERSHOOT_M);
                     if value < room {
                         room = value;
                         closer(usize::from(a), Met::Part(usize::from(b)));
@@ -161,27 +171,10 @@ impl Space<'_> {
         room
     }
 
-    /// Distance from a ball's centre to the map. The field knows nothing of what the tool may touch, so where that could
-    /// matter the voxels around are looked at one by one.
-    fn map_distance_m(&self, map: &MapObstacles<'_>, ball: &Placed, role: Role) -> f64 {
-        let distance = map.field.distance_m(&ball.center);
-        let needed = ball.radius_m + MAP_MARGIN_M;
-        match map.touchable {
-            Some(touchable) if role == Role::Tool && distance < needed => {
-                nearest_voxel(map, &ball.center, needed, |cell| !touchable(cell)).map_or(needed, |near| near.distance_m)
-            }
-            _ => distance,
-        }
-    }
-
     /// Centre of the occupied voxel that is nearest to a point, or the point itself.
     fn voxel_near(&self, point: Point3<f64>) -> [f32; 3] {
-        let near = self.map.as_ref().and_then(|map| {
-            let touchable = map.touchable;
-            let counts = |cell: usize| touchable.is_none_or(|touchable| !touchable(cell));
-            nearest_voxel(map, &point, map.field.cap_m().min(PLENTY_M), counts)
-        });
-        near.map_or_else(|| point.map(|v| v as f32).coords.into(), |near| near.center)
+        let near = self.map.as_ref().and_then(|map| nearest_voxel(map, &point, map.field.cap_m().min(PLENTY_M)));
+        near.unwrap_or_else(|| point.map(|v| v as f32).coords.into())
     }
 }
 
@@ -194,19 +187,8 @@ enum Met {
     Part(usize),
 }
 
-/// A voxel and how far it is.
-struct NearVoxel {
-    center: [f32; 3],
-    distance_m: f64,
-}
-
-/// The nearest occupied voxel within `reach_m` whose floor cell `counts`.
-fn nearest_voxel(
-    map: &MapObstacles<'_>,
-    point: &Point3<f64>,
-    reach_m: f64,
-    counts: impl Fn(usize) -> bool,
-) -> Option<NearVoxel> {
+/// Centre of the nearest occupied voxel within `reach_m`.
+fn nearest_voxel(map: &MapObstacles<'_>, point: &Point3<f64>, reach_m: f64) -> Option<[f32; 3]> {
     let grid = map.field.grid();
     let voxel_m = f64::from(grid.voxel_m);
     let reach = reach_m + 0.5 * voxel_m;
@@ -215,14 +197,14 @@ fn nearest_voxel(
         at(point[axis] - reach).floor() as usize..at(point[axis] + reach).ceil() as usize
     };
     let center = |axis: usize, i: usize| f64::from(grid.origin[axis]) + (i as f64 + 0.5) * voxel_m;
-    let mut best: Option<NearVoxel> = None;
+    let mut best = None;
     let mut limit = reach * reach;
     for x in range(0) {
         let dx = (center(0, x) - point.x).powi(2);
         for y in range(1) {
             let on_plan = dx + (center(1, y) - point.y).powi(2);
             let cell = x * grid.dims[1] + y;
-            if on_plan > limit || !counts(cell) {
+            if on_plan > limit {
                 continue;
             }
             for z in range(2) {
@@ -230,7 +212,7 @@ fn nearest_voxel(
                 if squared < limit && map.occupied.contains(cell * grid.dims[2] + z) {
                     limit = squared;
                     let at = [center(0, x) as f32, center(1, y) as f32, center(2, z) as f32];
-                    best = Some(NearVoxel { center: at, distance_m: squared.sqrt() - 0.5 * voxel_m });
+                    best = Some(at);
                 }
             }
         }

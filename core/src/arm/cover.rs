@@ -25,7 +25,8 @@ impl Ball {
     /// A ball around others, about the middle of their box.
     pub(super) fn around(balls: &[Ball]) -> Self {
         let points = balls.iter().map(|ball| ball.center.map(|v| v as f32));
-        let center = Bounds::around(points).map_or_else(Point::origin, |b| nalgebra::center(&b.min, &b.max)).map(f64::from);
+        let center =
+            Bounds::around(points).map_or_else(Point::origin, |b| nalgebra::center(&b.min, &b.max)).map(f64::from);
         let radius_m = balls.iter().map(|b| (b.center - center).norm() + b.radius_m).fold(0.0, f64::max);
         Self { center, radius_m }
     }
@@ -125,8 +126,7 @@ fn ball_around(part: &ConvexPart, cell: &Bounds) -> Option<Ball> {
 }
 
 fn box_faces(corners: &[Point]) -> Vec<Vec<Point>> {
-    const FACES: [[usize; 4]; 6] =
-        [[0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6]];
+    const FACES: [[usize; 4]; 6] = [[0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6]];
     FACES.iter().map(|face| face.iter().map(|&i| corners[i]).collect()).collect()
 }
 

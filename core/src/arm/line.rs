@@ -21,7 +21,12 @@ pub struct Follow {
 
 /// Moves the tool from `start` straight along `travel` (shelf's frame, metres) without turning it, as far as the same
 /// branch reaches and `allowed` lets it.
-pub fn follow_line(arm: &Arm, start: &Joints, travel: &Vector3<f64>, mut allowed: impl FnMut(&Joints) -> bool) -> Follow {
+pub fn follow_line(
+    arm: &Arm,
+    start: &Joints,
+    travel: &Vector3<f64>,
+    mut allowed: impl FnMut(&Joints) -> bool,
+) -> Follow {
     let from = arm.world_from_tool(start);
     let steps = ((travel.norm() / LINE_STEP_M) - 1e-6).ceil().max(0.0) as usize;
     let mut path = vec![*start];

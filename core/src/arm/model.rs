@@ -41,14 +41,12 @@ impl Joint {
     pub fn parent_from_child(&self, value: f64) -> Frame {
         self.parent_from_joint
             * match self.kind {
-                JointKind::Turning => Frame::from_parts(
-                    Translation3::identity(),
-                    UnitQuaternion::from_axis_angle(&self.axis, value),
-                ),
-                JointKind::Sliding => Frame::from_parts(
-                    Translation3::from(self.axis.into_inner() * value),
-                    UnitQuaternion::identity(),
-                ),
+                JointKind::Turning => {
+                    Frame::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&self.axis, value))
+                }
+                JointKind::Sliding => {
+                    Frame::from_parts(Translation3::from(self.axis.into_inner() * value), UnitQuaternion::identity())
+                }
             }
     }
 }
@@ -182,6 +180,13 @@ impl Arm {
     pub fn shortest_time_s(&self, a: &Joints, b: &Joints) -> f64 {
         let times = a.iter().zip(b.iter()).zip(&self.joints).map(|((a, b), joint)| (a - b).abs() / joint.speed);
         times.fold(0.0, f64::max)
+    }
+
+    /// The link that the gripper's first part belongs to; the last link where there is no gripper.
+    pub fn gripper_name(&self) -> &str {
+        let parts = self.bodies.last().into_iter().flatten();
+        let tool = parts.clone().find(|part| part.role == Role::Tool).or(parts.last());
+        tool.map_or("gripper", |part| part.link.as_str())
     }
 
     /// Whether the inverse is computed in closed form.

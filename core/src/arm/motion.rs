@@ -26,7 +26,7 @@ pub struct Motion {
 
 impl Motion {
     /// The fastest motion along a way within the joints' speeds in which the tool is not faster than `tool_m_s`; the
-    /// whole comes up to speed and back to rest in [`RAMP_S`].
+    /// whole comes up to speed and back to rest in `RAMP_S`.
     pub fn along(arm: &Arm, path: &[Joints], tool_m_s: f64) -> Self {
         let Some(first) = path.first() else { return Self::default() };
         let mut cruise = vec![0.0];
@@ -67,7 +67,9 @@ impl Motion {
     /// The same way back, just as fast.
     pub fn reversed(&self) -> Self {
         let end = self.duration_s();
-        Self { stops: self.stops.iter().rev().map(|stop| Stop { at_s: end - stop.at_s, joints: stop.joints }).collect() }
+        Self {
+            stops: self.stops.iter().rev().map(|stop| Stop { at_s: end - stop.at_s, joints: stop.joints }).collect(),
+        }
     }
 
     /// This motion and then another that begins where this one ends.

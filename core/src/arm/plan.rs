@@ -1,9 +1,9 @@
 //! Ways through a space: straight if that is free, else by two trees that grow towards each other, then shortened.
 
+use super::Joints;
 use super::rrt::Trees;
 use super::shortcut::shortcut;
 use super::space::Space;
-use super::Joints;
 use crate::rng::ChaCha8Rng;
 
 /// Gaps smaller than this between what two configurations are known to have free are taken for free, metres: half of
@@ -90,4 +90,3 @@ pub(super) fn is_span_free(space: &Space<'_>, a: &Joints, b: &Joints, room_a: f6
             is_span_free(space, &middle, b, room, room_b) && is_span_free(space, a, &middle, room_a, room)
         }
 }
-

@@ -1,10 +1,11 @@
 //! What carries pushes out: the arm, or a tool that flies.
 
-use super::{Arm, Joints, Motion, RobotPlacement, Space};
+use super::{Arm, Joints, Motion, Space};
 use crate::grid::{Grid, VoxelSet};
-use crate::scene::Shelf;
-use crate::tool::Tool;
+use crate::scene::{RobotPlacement, Shelf};
+use crate::tool::{Push, Tool};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Speed of the tip on the way to a push, metres per second.
 pub const WAY_IN_M_S: f64 = 0.25;
@@ -19,12 +20,22 @@ pub enum Pusher {
     /// A gripper with two links that comes in straight and needs no arm.
     Free(Tool),
     /// An arm before the shelf.
-    Arm(Box<ArmTool>),
+    Arm(Arc<ArmTool>),
 }
 
 impl Default for Pusher {
     fn default() -> Self {
         Self::Free(Tool::standard())
+    }
+}
+
+impl Pusher {
+    /// The arm, if one pushes.
+    pub fn arm(&self) -> Option<&ArmTool> {
+        match self {
+            Self::Free(_) => None,
+            Self::Arm(arm) => Some(arm),
+        }
     }
 }
 
@@ -51,7 +62,7 @@ impl ArmTool {
         Self::new(Arm::standard(&RobotPlacement::default()), shelf)
     }
 
-    /// The arm among voxels that are believed to be there.
+    /// The arm before its shelf, of which nothing else is known.
     pub fn space(&self) -> Space<'_> {
         Space::empty(&self.arm, &self.shelf)
     }
@@ -81,6 +92,27 @@ impl PushMotion {
     /// How long it takes, way back included, seconds.
     pub fn duration_s(&self, arm: &Arm) -> f64 {
         self.way_in.duration_s() + self.push.duration_s() + self.way_back(arm).duration_s()
+    }
+
+    /// The whole motion: in, along the push, back.
+    pub fn whole(&self, arm: &Arm) -> Motion {
+        self.way_in.clone().then(&self.push).then(&self.way_back(arm))
+    }
+
+    /// Whether this motion carries out a push: its tip is at the push's start and end when it should be, to within a
+    /// tenth of a millimetre, and it begins at `ready`.
+    pub fn carries_out(&self, arm: &Arm, ready: &Joints, push: &Push) -> bool {
+        const SAME_M: f64 = 1e-4;
+        let tip = |joints: Option<Joints>| joints.map(|joints| arm.world_from_tool(&joints).translation.vector);
+        let at = |joints: Option<Joints>, point: crate::Point| {
+            tip(joints).is_some_and(|tip| (tip - point.coords.map(f64::from)).norm() < SAME_M)
+        };
+        let fits = |motion: &Motion| motion.stops.iter().all(|stop| stop.joints.len() == arm.joints.len());
+        fits(&self.way_in)
+            && fits(&self.push)
+            && self.way_in.at(0.0) == Some(*ready)
+            && at(self.push.at(0.0), push.start_point())
+            && at(self.push.at(self.push.duration_s()), push.end_point())
     }
 
     /// Every voxel that the arm touches on the way in or along the push.

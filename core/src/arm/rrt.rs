@@ -147,7 +147,11 @@ impl<'s, 'a> Trees<'s, 'a> {
         let node = self.trees[side].nodes[from];
         let travel = self.space.arm.travel_m(&node.at, target);
         if travel <= SHORTEST_M {
-            return if is_segment_free(self.space, &node.at, target) { self.reach(side, from, target) } else { Growth::Blocked };
+            return if is_segment_free(self.space, &node.at, target) {
+                self.reach(side, from, target)
+            } else {
+                Growth::Blocked
+            };
         }
         let mut share = (STEP_M / travel).min(1.0);
         for _ in 0..2 {

@@ -14,12 +14,7 @@ struct OnWay {
 }
 
 /// The way after `attempts` attempts to leave out what lies between two points of it. Never longer than before.
-pub(super) fn shortcut(
-    space: &Space<'_>,
-    mut path: Vec<Joints>,
-    attempts: usize,
-    rng: &mut ChaCha8Rng,
-) -> Vec<Joints> {
+pub(super) fn shortcut(space: &Space<'_>, mut path: Vec<Joints>, attempts: usize, rng: &mut ChaCha8Rng) -> Vec<Joints> {
     if path.len() > 2 && is_segment_free(space, &path[0], &path[path.len() - 1]) {
         return vec![path[0], path[path.len() - 1]];
     }

@@ -13,7 +13,7 @@ pub const SHELF_MARGIN_M: f64 = 0.005;
 pub(super) const PANEL_M: f64 = 0.02;
 
 /// The shelf's panels in the order of [`super::Obstacle::Shelf`]'s names.
-pub(super) const PANELS: [&str; 5] = ["board", "back", "left wall", "right wall", "ceiling"];
+pub(super) const PANELS: [&str; 6] = ["board", "back", "left wall", "right wall", "ceiling", "inside"];
 
 /// A panel, `f64`.
 #[derive(Clone, Copy, Debug)]
@@ -40,10 +40,21 @@ impl Slab {
 pub struct Space<'a> {
     /// The arm.
     pub arm: &'a Arm,
-    pub(super) panels: [Slab; 5],
+    pub(super) panels: Vec<Slab>,
+    /// A box around them and all that they hold.
+    pub(super) outer: Slab,
     /// Height of the table that the arm stands on, metres.
     pub(super) table_z: f64,
     pub(super) map: Option<MapObstacles<'a>>,
+}
+
+/// What the gripper may do with what is on the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Gripper {
+    /// It keeps the margin like all parts of the arm.
+    KeepsAway,
+    /// It may touch.
+    MayTouch,
 }
 
 /// Voxels that are believed to be there, with the distances to them.
@@ -51,8 +62,8 @@ pub struct Space<'a> {
 pub(super) struct MapObstacles<'a> {
     pub occupied: &'a VoxelSet,
     pub field: &'a DistanceField,
-    /// Floor cells whose voxels the tool may touch.
-    pub touchable: Option<&'a (dyn Fn(usize) -> bool + Sync)>,
+    /// Whether the gripper counts too; while it pushes it is checked voxel by voxel instead ([`Arm::gripper_touches`]).
+    pub gripper: Gripper,
 }
 
 impl<'a> Space<'a> {
@@ -63,35 +74,45 @@ impl<'a> Space<'a> {
         let slab = |min: [f64; 3], max: [f64; 3]| Slab { min, max };
         Self {
             arm,
-            panels: [
+            panels: vec![
                 slab([min.x - t, min.y, min.z - t], [max.x + t, max.y + t, min.z]),
                 slab([min.x - t, max.y, min.z], [max.x + t, max.y + t, max.z]),
                 slab([min.x - t, min.y, min.z], [min.x, max.y, max.z]),
                 slab([max.x, min.y, min.z], [max.x + t, max.y, max.z]),
                 slab([min.x - t, min.y, max.z], [max.x + t, max.y + t, max.z + t]),
             ],
+            outer: slab([min.x - t, min.y, min.z - t], [max.x + t, max.y + t, max.z + t]),
             table_z: arm.world_from_base.translation.z,
             map: None,
         }
     }
 
+    /// The same with the whole inside of the shelf forbidden.
+    pub fn closed(arm: &'a Arm, shelf: &Shelf) -> Self {
+        let mut space = Self::empty(arm, shelf);
+        space.panels.push(Slab { min: shelf.min().map(f64::from).into(), max: shelf.max().map(f64::from).into() });
+        space
+    }
+
     /// The same with voxels that must not be touched, and the distances to them.
     pub fn with_map(mut self, occupied: &'a VoxelSet, field: &'a DistanceField) -> Self {
-        self.map = Some(MapObstacles { occupied, field, touchable: None });
+        self.map = Some(MapObstacles { occupied, field, gripper: Gripper::KeepsAway });
         self
     }
 
-    /// The same, but the tool may touch what stands on the floor cells that `touchable` names.
-    pub fn touching(&self, touchable: &'a (dyn Fn(usize) -> bool + Sync)) -> Self {
+    /// The same, but the gripper may touch what the map has.
+    pub fn pushing(&self) -> Self {
         let mut space = self.clone();
         if let Some(map) = &mut space.map {
-            map.touchable = Some(touchable);
+            map.gripper = Gripper::MayTouch;
         }
         space
     }
 
     /// The panels as boxes.
-    pub fn panels(&self) -> [Bounds; 5] {
-        self.panels.map(|slab| Bounds { min: slab.min.map(|v| v as f32).into(), max: slab.max.map(|v| v as f32).into() })
+    pub fn panels(&self) -> Vec<Bounds> {
+        let bounds =
+            |slab: &Slab| Bounds { min: slab.min.map(|v| v as f32).into(), max: slab.max.map(|v| v as f32).into() };
+        self.panels.iter().map(bounds).collect()
     }
 }

@@ -1,6 +1,6 @@
 //! The space that an arm sweeps: every voxel that one of its parts touches along a way.
 
-use super::{Arm, Joints, pose_of};
+use super::{Arm, DistanceField, Frame, Joints, Role, pose_of};
 use crate::grid::{Cell, Grid, VoxelSet};
 use crate::solid::{Bounds, ConvexPart, HalfSpace, levels_inside};
 use crate::{Pose, Vector};
@@ -24,6 +24,33 @@ impl Arm {
         }
     }
 
+    /// The first voxel for which `blocked` holds that the gripper touches with its tip at `world_from_tool`; parts that are
+    /// farther from every voxel of `field` than their size are not looked at.
+    pub fn gripper_touches(
+        &self,
+        world_from_tool: &Frame,
+        field: &DistanceField,
+        blocked: impl Fn(usize) -> bool,
+    ) -> Option<usize> {
+        let world_from_last = world_from_tool * self.last_from_tool.inverse();
+        let parts = self.bodies.last()?.iter().filter(|part| part.role == Role::Tool);
+        for part in parts {
+            if field.distance_m(&(world_from_last * part.around.center)) > part.around.radius_m {
+                continue;
+            }
+            let mut met = None;
+            voxels_of(field.grid(), &part.shape, &pose_of(&world_from_last), |index| {
+                if met.is_none() && blocked(index) {
+                    met = Some(index);
+                }
+            });
+            if met.is_some() {
+                return met;
+            }
+        }
+        None
+    }
+
     fn tool_travel_m(&self, a: &Joints, b: &Joints) -> f64 {
         (self.world_from_tool(a).translation.vector - self.world_from_tool(b).translation.vector).norm()
     }
@@ -39,14 +66,15 @@ impl Arm {
                 (0..3).all(|axis| center[axis] + radius > min[axis] && center[axis] - radius < max[axis])
             };
             if part.balls.iter().any(touches) {
-                insert_part(swept, grid, &part.shape, &pose_of(&poses[body]));
+                voxels_of(grid, &part.shape, &pose_of(&poses[body]), |index| swept.insert(index));
             }
         }
     }
 }
 
-/// Adds the voxels whose box touches a part at `pose`: those whose centre is inside the part grown by a voxel's box.
-fn insert_part(swept: &mut VoxelSet, grid: &Grid, part: &ConvexPart, pose: &Pose) {
+/// Calls `touch` with every voxel whose box touches a part at `pose`: those whose centre is inside the part grown by a
+/// voxel's box.
+fn voxels_of(grid: &Grid, part: &ConvexPart, pose: &Pose, mut touch: impl FnMut(usize)) {
     let half = 0.5 * grid.voxel_m;
     let faces: Vec<HalfSpace> = part
         .planes
@@ -72,7 +100,7 @@ fn insert_part(swept: &mut VoxelSet, grid: &Grid, part: &ConvexPart, pose: &Pose
             let column = grid.column(cell).start;
             for z in levels_inside(grid, cell, &faces) {
                 if (bottom..top).contains(&z) {
-                    swept.insert(column + z);
+                    touch(column + z);
                 }
             }
         }

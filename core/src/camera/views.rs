@@ -147,7 +147,7 @@ fn check_camera(camera: &Intrinsics) -> std::result::Result<(), String> {
 }
 
 /// The pose of a camera at `position` that looks at `target`, upright (its x axis is level).
-fn look_at(position: [f32; 3], target: [f32; 3]) -> std::result::Result<Pose, String> {
+pub(super) fn look_at(position: [f32; 3], target: [f32; 3]) -> std::result::Result<Pose, String> {
     if position.iter().chain(&target).any(|x| !x.is_finite() || x.abs() > 100.0) {
         return Err("position and target must be finite and within 100 m".into());
     }
@@ -196,12 +196,7 @@ mod tests {
     fn shipped_text(name: &str) -> String {
         match name {
             "standard300" => dome(name, "10 x 10 positions with three look-at targets each", 10),
-            _ => dome(
-                name,
-                "5 x 5 positions with three look-at targets each: stands for the poses that the robot's arm reaches, \
-                 until the arm itself is modelled",
-                5,
-            ),
+            _ => super::super::reach::tests::real75(),
         }
     }
 

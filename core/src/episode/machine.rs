@@ -1,10 +1,15 @@
 //! The episode as a state machine.
 
-use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
+use super::record::{
+    EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
+};
+use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion, Pusher};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::Grid;
 use crate::plan::{self, Action, Decision, History, Reason, Situation};
+use crate::push::ArmClearance;
+use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::score::{Scores, object_verdicts};
 use crate::tool::{Push, Tool};
@@ -21,6 +26,13 @@ pub struct Episode {
     update: Arc<dyn BeliefUpdate>,
     views: Arc<ViewArray>,
     tool: Arc<Tool>,
+    arm: Arc<ArmTool>,
+    /// How the hand gets to each view; `None` where it cannot be.
+    hands: Arc<Vec<Option<HandPose>>>,
+    /// Where the hand is, if the arm can wait anywhere.
+    hand: Option<HandPose>,
+    /// Views that are not offered.
+    unreachable: Arc<Vec<ViewId>>,
     world: World,
     bodies: Arc<Vec<Body>>,
     belief: Arc<Belief>,
@@ -51,6 +63,9 @@ impl Episode {
         }
         update.check_grid(&scene.grid())?;
         let views = Arc::new(ViewArray::named(&config.views)?);
+        let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
+        let hands = Arc::new(views.hand_poses(&arm));
+        let unreachable = Arc::new(views.unreachable(&hands));
         let mut world = World::new(scene.shelf, scene.bodies(&catalog)?);
         world.settle();
         let bodies = Arc::new(world.bodies());
@@ -70,6 +85,10 @@ impl Episode {
             update,
             views,
             tool: Arc::new(Tool::standard()),
+            hand: arm.ready.map(HandPose::waiting),
+            arm,
+            hands,
+            unreachable,
             world,
             bodies,
             belief,
@@ -91,7 +110,8 @@ impl Episode {
             belief: &self.belief,
             update: &*self.update,
             views: &self.views,
-            tool: &self.tool,
+            pusher: &Pusher::Arm(self.arm.clone()),
+            unreachable: &self.unreachable,
             history: &self.history,
             budget: self.record.config.budget,
             seed: self.record.config.seed,
@@ -107,8 +127,8 @@ impl Episode {
     /// [`Episode::decide`] before.
     ///
     /// # Errors
-    /// [`Error::Usage`] past the budget, for a view that the array does not have, for a push that is no finite motion,
-    /// and for a push after an object was dropped. The episode is then as it was.
+    /// [`Error::Usage`] past the budget, for a view that the array does not have, for a push that is no finite motion or
+    /// that the arm cannot carry out, and for a push after an object was dropped. The episode is then as it was.
     pub fn act(&mut self, decision: Decision) -> Result<StepOutcome> {
         if self.is_finished() {
             return Err(Error::Usage(format!("the budget of {} actions is used up", self.record.config.budget)));
@@ -128,11 +148,14 @@ impl Episode {
         };
         let started = Instant::now();
         let (image, observation) = self.observe(&view);
+        let motion = self.carry(self.hands.get(usize::from(view.id.0)).cloned().flatten());
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         self.belief = Arc::new(self.update.observe(&self.belief, &observation));
-        let record = self.file(decision, &[], 0.0, started, seconds);
+        let motion_s = motion.as_ref().map_or(0.0, Motion::duration_s);
+        let happened = Happened { motion_s, ..Happened::default() };
+        let record = self.file(decision, happened, started, seconds);
         Ok(StepOutcome {
             record,
             image: Some(image),
@@ -140,10 +163,11 @@ impl Episode {
             swept: None,
             prediction: None,
             push_outcome: None,
+            motion,
         })
     }
 
-    fn push(&mut self, decision: Decision, push: Push, mut seconds: StepSeconds) -> Result<StepOutcome> {
+    fn push(&mut self, mut decision: Decision, push: Push, mut seconds: StepSeconds) -> Result<StepOutcome> {
         if self.history.dropped {
             return Err(Error::Usage("an object was dropped: this episode pushes no more".to_owned()));
         }
@@ -152,19 +176,27 @@ impl Episode {
             return Err(Error::Usage(format!("a push must be a finite motion, not {numbers:?}")));
         }
         let started = Instant::now();
-        let outcome: PushOutcome = self.world.execute(&self.tool, &push);
+        let arm = self.arm.clone();
+        let motion = self.motion_for(&arm, &mut decision, &push)?;
+        let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
+        let outcome: PushOutcome = self.world.execute_motion(&arm.arm, &motion);
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        let swept = SweptPush { push, swept: self.tool.swept_volume(&push, &self.grid()) };
+        let swept = SweptPush { push, swept: motion.swept_volume(&arm.arm, &self.grid()) };
         let prediction = self.predict(&swept, decision.reason);
         if let Some(prediction) = &prediction {
             Arc::make_mut(&mut self.belief).apply(prediction);
         }
         self.bodies = Arc::new(self.world.bodies());
         self.truth = Arc::new(TruthMap::of(&self.grid(), &self.bodies));
-        let displacement_m = outcome.displacement_m.iter().map(|m| f64::from(*m)).sum();
-        let record = self.file(decision, &outcome.dropped, displacement_m, started, seconds);
+        let happened = Happened {
+            dropped: outcome.dropped.clone(),
+            displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
+            motion_s: to_wait.duration_s() + f64::from(outcome.arm_s),
+            push: Some(self.report(&outcome)),
+        };
+        let record = self.file(decision, happened, started, seconds);
         Ok(StepOutcome {
             record,
             image: None,
@@ -172,7 +204,57 @@ impl Episode {
             swept: Some(swept),
             prediction,
             push_outcome: Some(outcome),
+            motion: Some(to_wait.then(&motion.whole(&arm.arm))),
         })
+    }
+
+    /// The arm's motion for a push: the decision's if it is for this push, else a new one, which the decision then keeps.
+    fn motion_for(&self, arm: &ArmTool, decision: &mut Decision, push: &Push) -> Result<PushMotion> {
+        let kept = decision
+            .motion
+            .take()
+            .filter(|motion| arm.ready.is_some_and(|ready| motion.carries_out(&arm.arm, &ready, push)));
+        let motion = match kept {
+            Some(motion) => motion,
+            None => {
+                let clearance = ArmClearance::new(arm, &self.belief);
+                let mut rng = stream(self.record.config.seed, "push by hand", self.record.steps.len() as u64);
+                clearance
+                    .motion(push, &clearance.target_of(push), &mut rng)
+                    .map_err(|reason| Error::Usage(format!("the arm cannot carry this push out: {reason}")))?
+            }
+        };
+        decision.motion = Some(motion.clone());
+        Ok(motion)
+    }
+
+    /// Moves the hand, if there is an arm that can be there.
+    fn carry(&mut self, to: Option<HandPose>) -> Option<Motion> {
+        let (from, to) = (self.hand.as_ref()?, to?);
+        let mut rng = stream(self.record.config.seed, "ways of the hand", self.record.steps.len() as u64);
+        let motion = self.arm.carry(from, &to, &mut rng);
+        self.hand = Some(to);
+        Some(motion)
+    }
+
+    fn report(&self, outcome: &PushOutcome) -> PushReport {
+        let touch = |contact: &crate::world::LinkContact| LinkTouch {
+            link: contact.link.clone(),
+            object: self.name(contact.object),
+        };
+        PushReport {
+            pushed_m: outcome.pushed_m,
+            stalled: outcome.stalled,
+            contacts: outcome.link_contacts.iter().map(touch).collect(),
+            against_wall: outcome.against_wall.iter().map(|id| self.name(*id)).collect(),
+            arm_in_shelf_m: outcome.arm_in_shelf_m,
+        }
+    }
+
+    /// `class#id`.
+    fn name(&self, id: ObjectId) -> String {
+        let object = self.record.scene.objects.get(usize::from(id.0));
+        format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
     }
 
     /// The prediction that becomes the belief after a push: for a policy that predicts its pushes, and for a person's.
@@ -196,16 +278,11 @@ impl Episode {
     fn file(
         &mut self,
         decision: Decision,
-        dropped: &[ObjectId],
-        displacement_m: f64,
+        happened: Happened,
         updating: Instant,
         mut seconds: StepSeconds,
     ) -> StepRecord {
-        self.history.record(&decision, !dropped.is_empty());
-        let name = |id: &ObjectId| {
-            let object = self.record.scene.objects.get(usize::from(id.0));
-            format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
-        };
+        self.history.record(&decision, !happened.dropped.is_empty());
         let scores = Scores::of(&self.belief, &self.truth);
         let objects = object_verdicts(&self.belief, &self.truth, &self.catalog);
         seconds.update = updating.elapsed().as_secs_f64();
@@ -215,8 +292,10 @@ impl Episode {
             decision,
             scores,
             objects,
-            dropped: dropped.iter().map(name).collect(),
-            displacement_m,
+            dropped: happened.dropped.iter().map(|id| self.name(*id)).collect(),
+            displacement_m: happened.displacement_m,
+            motion_s: happened.motion_s,
+            push: happened.push,
             seconds,
         };
         self.record.steps.push(step.clone());
@@ -275,7 +354,30 @@ impl Episode {
         &self.views
     }
 
-    /// What pushes.
+    /// The arm before the shelf.
+    pub fn arm(&self) -> &Arc<ArmTool> {
+        &self.arm
+    }
+
+    /// Per view, how the hand gets there; `None` where it cannot be.
+    pub fn hand_poses(&self) -> &[Option<HandPose>] {
+        &self.hands
+    }
+
+    /// The views that are not offered, because the hand cannot be there; none where the hand can be nowhere, so that an
+    /// episode without a fitting arm still looks.
+    pub fn unreachable_views(&self) -> &[ViewId] {
+        &self.unreachable
+    }
+
+    /// Why this episode will never push, if that is known from the start.
+    pub fn why_no_push(&self) -> Option<String> {
+        let name = &self.arm.arm.name;
+        let words = || format!("{name} reaches no place before the shelf from where it stands, so nothing is pushed");
+        self.arm.ready.is_none().then(words)
+    }
+
+    /// The shape that stands for gripper and last links where no motion of the arm is known.
     pub fn tool(&self) -> &Tool {
         &self.tool
     }
@@ -294,6 +396,15 @@ impl Episode {
     pub fn history(&self) -> &History {
         &self.history
     }
+}
+
+/// What an action brought beside its belief.
+#[derive(Default)]
+struct Happened {
+    dropped: Vec<ObjectId>,
+    displacement_m: f64,
+    motion_s: f64,
+    push: Option<PushReport>,
 }
 
 /// Seconds that deciding took, kept from `decide`, which changes nothing else, to `act`.

@@ -21,11 +21,12 @@ fn manual(action: Action) -> Decision {
         gains,
         candidates: Vec::new(),
         best_push: None,
+        motion: None,
     }
 }
 
-/// A push into the pasta box from its left.
-const SIDEWAYS: Push = Push { start: [-0.11, 0.15, 0.06], direction_deg: 0.0, length_m: 0.06 };
+/// A push into the front of the pasta box.
+const HEAD_ON: Push = Push { start: [0.02, 0.11, 0.06], direction_deg: 90.0, length_m: 0.08 };
 
 #[test]
 fn looking_tells_what_is_there() {
@@ -56,7 +57,7 @@ fn a_push_moves_objects_and_is_predicted_into_the_belief() {
         episode.act(manual(Action::Look { view: ViewId(view) })).expect("a look");
     }
     let (belief, truth) = (episode.belief().clone(), episode.truth().clone());
-    let outcome = episode.act(manual(Action::Push(SIDEWAYS))).expect("a push");
+    let outcome = episode.act(manual(Action::Push(HEAD_ON))).expect("a push");
     assert!(outcome.record.displacement_m > 0.01, "{}", outcome.record.displacement_m);
     assert!(outcome.record.dropped.is_empty());
     assert_ne!(*episode.truth(), truth);
@@ -73,7 +74,7 @@ fn a_blind_policy_leaves_the_belief_as_it_is_after_its_push() {
     let mut episode = synthetic::episode(PolicyKind::RandomPush5Blind, 4);
     episode.act(manual(Action::Look { view: ViewId(45) })).expect("a look");
     let (belief, truth) = (episode.belief().clone(), episode.truth().clone());
-    let decision = Decision { reason: Reason::Schedule, ..manual(Action::Push(SIDEWAYS)) };
+    let decision = Decision { reason: Reason::Schedule, ..manual(Action::Push(HEAD_ON)) };
     let outcome = episode.act(decision).expect("a push");
     assert!(outcome.prediction.is_none());
     assert!(*episode.belief() == belief && *episode.truth() != truth);
@@ -87,7 +88,7 @@ fn deciding_changes_nothing_and_a_clone_is_a_branch() {
     assert_eq!(decision, episode.decide());
     let before = (episode.record().clone(), episode.belief().clone(), episode.truth().clone());
     let mut branch = episode.clone();
-    let push = branch.act(manual(Action::Push(SIDEWAYS))).expect("a push");
+    let push = branch.act(manual(Action::Push(HEAD_ON))).expect("a push");
     assert!(push.record.displacement_m > 0.0);
     assert!(before == (episode.record().clone(), episode.belief().clone(), episode.truth().clone()));
     assert_eq!(decision, episode.decide());
@@ -96,7 +97,7 @@ fn deciding_changes_nothing_and_a_clone_is_a_branch() {
     assert_eq!(timeless(&one.record), timeless(&other.record));
     assert!(episode.belief() == twin.belief());
     // The same push after the same look leads to the same truth.
-    let again = episode.act(manual(Action::Push(SIDEWAYS))).expect("a push");
+    let again = episode.act(manual(Action::Push(HEAD_ON))).expect("a push");
     assert_eq!(again.push_outcome, push.push_outcome);
 }
 
@@ -107,9 +108,11 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
     let push = |push: Push| manual(Action::Push(push));
     let refused = [
         (manual(Action::Look { view: ViewId(300) }), "view 300 of 300 in standard300"),
-        (push(Push { length_m: f32::NAN, ..SIDEWAYS }), "a push must be a finite motion"),
-        (push(Push { start: [f32::INFINITY; 3], ..SIDEWAYS }), "a push must be a finite motion"),
-        (push(Push { length_m: -0.1, ..SIDEWAYS }), "a push must be a finite motion"),
+        (push(Push { length_m: f32::NAN, ..HEAD_ON }), "a push must be a finite motion"),
+        (push(Push { start: [f32::INFINITY; 3], ..HEAD_ON }), "a push must be a finite motion"),
+        (push(Push { length_m: -0.1, ..HEAD_ON }), "a push must be a finite motion"),
+        (push(Push { start: [0.38, 0.11, 0.06], ..HEAD_ON }), "the arm cannot carry this push out: "),
+        (push(Push { start: [0.0, 2.0, 0.06], ..HEAD_ON }), "out of the arm's reach at the start"),
     ];
     for (decision, words) in refused {
         let error = episode.act(decision).expect_err("refused");
@@ -131,16 +134,35 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
     assert!(new(EpisodeConfig { budget: 0, ..config }).is_some());
 }
 
+/// The arm's motion for a push with the gripper turned away from where it pulls to: in from the left, around a can.
+fn hook(episode: &Episode, push: &Push) -> PushMotion {
+    let tool = episode.arm();
+    let (arm, ready) = (&tool.arm, tool.ready.expect("a place to wait"));
+    let tip = push.start_point().map(f64::from);
+    let pose = crate::arm::level_tool(&tip, -0.9);
+    let travel = push.direction().map(f64::from) * f64::from(push.length_m);
+    let aside = nalgebra::Vector3::new(-0.30, -0.15, 0.0);
+    let ways = arm.inverse(&pose, &ready).into_iter().filter_map(|start| {
+        let along = crate::arm::follow_line(arm, &start, &travel, |_| true);
+        let out = crate::arm::follow_line(arm, &start, &aside, |_| true);
+        let way_in: Vec<_> = std::iter::once(ready).chain(out.path.iter().rev().copied()).collect();
+        (along.complete && out.complete).then(|| PushMotion::new(arm, &way_in, &along.path))
+    });
+    ways.min_by(|a, b| a.duration_s(arm).total_cmp(&b.duration_s(arm))).expect("a way around")
+}
+
 #[test]
 fn a_drop_is_recorded_and_ends_the_pushing() {
-    // A can that stands over the edge, 2 cm of its radius of 3.3 cm on the board, pushed out from behind.
+    // A can that stands over the edge, 2 cm of its radius of 3.3 cm on the board, hooked from behind and pulled out.
     let mut scene = synthetic::cluttered_scene();
     scene.objects = vec![crate::scene::Object::new("tomato_can", [0.0, 0.02], 0.0)];
     let config = synthetic::config(PolicyKind::Mem, 6);
     let catalog = Arc::new(Catalog::standard());
     let mut episode = Episode::new(scene, catalog, config, Arc::new(crate::belief::Classical)).expect("an episode");
-    let push = Push { start: [-0.09, 0.12, 0.06], direction_deg: -55.0, length_m: 0.2 };
-    let outcome = episode.act(manual(Action::Push(push))).expect("a push");
+    let push = Push { start: [0.02, 0.09, 0.06], direction_deg: -80.0, length_m: 0.15 };
+    let mut hooked = manual(Action::Push(push));
+    hooked.motion = Some(hook(&episode, &push));
+    let outcome = episode.act(hooked).expect("a push");
     assert_eq!(outcome.record.dropped, ["tomato_can#0"]);
     assert!(episode.bodies().is_empty() && episode.truth().occupancy.iter().all(|occupied| *occupied == 0));
     assert!(episode.history().dropped && outcome.record.objects.is_empty());

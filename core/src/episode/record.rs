@@ -1,5 +1,6 @@
 //! What is kept of an episode: its configuration, its steps, and `episode.json` as a whole.
 
+use crate::arm::Motion;
 use crate::belief::{PushPrediction, SweptPush};
 use crate::camera::{Image, MapObservation, NoiseModel};
 use crate::plan::{Action, Decision, PlannerSettings, PolicyKind};
@@ -68,8 +69,38 @@ pub struct StepRecord {
     pub dropped: Vec<String>,
     /// Sum of object displacements of this step, metres.
     pub displacement_m: f64,
+    /// How long the robot moved in this step, seconds of its own time; 0 where no arm could be there.
+    #[serde(default)]
+    pub motion_s: f64,
+    /// What the arm met, after a push.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub push: Option<PushReport>,
     /// Where the time went.
     pub seconds: StepSeconds,
+}
+
+/// What became of a push by the arm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PushReport {
+    /// How far the tip really moved along the push, metres.
+    pub pushed_m: f32,
+    /// Whether the arm was blocked and gave up before the push's end.
+    pub stalled: bool,
+    /// Links (not the gripper) that touched an object, each with the object as `class#id`.
+    pub contacts: Vec<LinkTouch>,
+    /// Objects that were pressed against a wall of the shelf, `class#id`.
+    pub against_wall: Vec<String>,
+    /// How deep the arm got into a panel of the shelf at most, metres.
+    pub arm_in_shelf_m: f32,
+}
+
+/// A link that touched an object.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LinkTouch {
+    /// The link.
+    pub link: String,
+    /// The object, `class#id`.
+    pub object: String,
 }
 
 /// `episode.json`, and what `nudge run --json` prints.
@@ -118,4 +149,6 @@ pub struct StepOutcome {
     pub prediction: Option<PushPrediction>,
     /// What the push did.
     pub push_outcome: Option<PushOutcome>,
+    /// How the arm moved as it was planned: to the view, or to the push, along it and back.
+    pub motion: Option<Motion>,
 }

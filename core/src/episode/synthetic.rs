@@ -25,6 +25,7 @@ pub fn scene() -> Scene {
         shelf,
         objects: vec![Object::new("tomato_can", [0.0, 0.04], 12.5)],
         meshes: Default::default(),
+        robot: Default::default(),
     }
 }
 
@@ -44,13 +45,21 @@ pub fn record(steps: usize) -> EpisodeRecord {
         let action = if index == 2 { Action::Push(push) } else { Action::Look { view: ViewId(17) } };
         let gains: Vec<f32> = (0..300).map(|_| rng.random_range(0.0..5000.0)).collect();
         let candidates = vec![
-            CandidateRecord { push, rejection: None, gain: Some(gains[0]), view: Some(ViewId(3)), reg: Some(-0.7) },
+            CandidateRecord {
+                push,
+                rejection: None,
+                gain: Some(gains[0]),
+                view: Some(ViewId(3)),
+                reg: Some(-0.7),
+                motion_s: Some(6.25),
+            },
             CandidateRecord {
                 push,
                 rejection: Some(Rejection::StartBlocked { at: [0.1, 0.2, 0.3] }),
                 gain: None,
                 view: None,
                 reg: None,
+                motion_s: None,
             },
         ];
         StepRecord {
@@ -66,6 +75,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
                 gains,
                 candidates,
                 best_push: Some(0),
+                motion: None,
             },
             scores: scores(index),
             objects: vec![ObjectVerdict {
@@ -76,6 +86,8 @@ pub fn record(steps: usize) -> EpisodeRecord {
             }],
             dropped: if index == 2 { vec!["tomato_can#0".to_owned()] } else { Vec::new() },
             displacement_m: 0.01 * index as f64,
+            motion_s: 1.5 * index as f64,
+            push: None,
             seconds: StepSeconds { decide: 0.1, act: 0.2, update: 0.3, record: 0.4 },
         }
     };
@@ -89,7 +101,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
             seed: u64::MAX,
             budget: 4,
             views: "standard300".to_owned(),
-            planner: PlannerSettings { candidates: 80, gamma: 0.2 },
+            planner: PlannerSettings::default(),
             noise: None,
         },
         prior: scores(0),
@@ -135,7 +147,14 @@ pub fn cluttered_scene() -> Scene {
         ("meat_can", [0.25, 0.28], 5.0),
     ];
     let objects = objects.into_iter().map(|(class, position, yaw_deg)| Object::new(class, position, yaw_deg)).collect();
-    Scene { name: "cluttered".to_owned(), description: String::new(), shelf, objects, meshes: Default::default() }
+    Scene {
+        name: "cluttered".to_owned(),
+        description: String::new(),
+        shelf,
+        objects,
+        meshes: Default::default(),
+        robot: Default::default(),
+    }
 }
 
 /// The configuration of a classical episode.

@@ -1,6 +1,7 @@
 //! The card of a data directory: everything that its samples follow from.
 
 use super::{Recipe, SAMPLES_PER_SHARD, VIEWS};
+use crate::arm::Pusher;
 use crate::files::write_atomically;
 use crate::grid::Grid;
 use crate::{Error, Result};
@@ -63,6 +64,13 @@ pub struct Card {
     pub rho: f32,
     /// Share of samples with sensor noise.
     pub noise_share: f32,
+    /// What carried out the pushes: `arm`, or `free` for a tool that flies; maps have none.
+    #[serde(default = "no_pusher")]
+    pub pusher: String,
+}
+
+fn no_pusher() -> String {
+    "none".to_owned()
 }
 
 impl Card {
@@ -85,6 +93,11 @@ impl Card {
             fill: recipe.scenes.fill,
             rho: recipe.scenes.rho,
             noise_share: recipe.noise_share,
+            pusher: match (kind, &recipe.pusher) {
+                (Kind::Maps, _) => no_pusher(),
+                (Kind::Pushes, Pusher::Free(_)) => "free".to_owned(),
+                (Kind::Pushes, Pusher::Arm(_)) => "arm".to_owned(),
+            },
         }
     }
 
@@ -156,6 +169,7 @@ impl Card {
                 ("fill", format!("{:?}", card.fill)),
                 ("rho", card.rho.to_string()),
                 ("noise", card.noise_share.to_string()),
+                ("pushes by", card.pusher.clone()),
                 ("samples_per_shard", card.samples_per_shard.to_string()),
             ]
         };

@@ -2,6 +2,7 @@
 
 use super::bytes::{Reader, put_set};
 use super::{Kind, Sample, VIEWS};
+use crate::arm::Pusher;
 use crate::camera::{MapObservation, NoiseModel, ViewArray, ViewId, project};
 use crate::grid::{Grid, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
@@ -20,6 +21,8 @@ pub struct Recipe {
     pub scenes: GenerateConfig,
     /// The views that observations are drawn from.
     pub views: ViewArray,
+    /// What carries out the pushes of push samples.
+    pub pusher: Pusher,
     /// Share of samples that are observed with [`NoiseModel::STANDARD`]; the others are without noise.
     pub noise_share: f32,
 }

@@ -2,17 +2,18 @@
 //! of them really does.
 //!
 //! Pushes are sampled as the planner samples them, from the classical belief after the sample's views, and carried out
-//! in copies of the same world. Pushes that drop an object are left out: an episode pushes no more after one.
+//! by the arm in copies of the same world. Pushes that drop an object are left out: an episode pushes no more after one.
 
 use super::bytes::{Reader, put_set};
 use super::maps::{occupied, put_views, take_views};
 use super::{Kind, Recipe, Sample, VIEWS, ViewSample};
 use crate::Result;
+use crate::arm::Pusher;
 use crate::belief::{Belief, BeliefUpdate, Classical, SweptPush};
 use crate::grid::{Grid, VoxelSet};
-use crate::push;
+use crate::push::{self, Candidate};
 use crate::rng::stream;
-use crate::tool::{Push, Tool};
+use crate::tool::Push;
 use crate::world::{TruthMap, World};
 use rand::Rng;
 
@@ -77,28 +78,29 @@ impl PushSample {
         let views = recipe.look(world.shelf(), &bodies, count, scene_seed)?;
         let belief =
             views.iter().fold(Belief::uniform(grid), |belief, view| Classical.observe(&belief, &view.observation));
-        let tool = Tool::standard();
         let mut rng = stream(scene_seed, "sample pushes", 0);
-        let candidates = push::sample(&belief, &tool, 2 * PUSHES, &mut rng);
+        let candidates = push::sample_by(&belief, &recipe.pusher, PUSHES, &mut rng);
         let pushes = candidates
             .into_iter()
             .filter(|candidate| candidate.rejection.is_none())
-            .filter_map(|candidate| pushed(&grid, &world, &tool, candidate.swept))
-            .take(PUSHES)
+            .filter_map(|candidate| pushed(&grid, &world, &recipe.pusher, candidate))
             .collect();
         Ok(Self { seed, truth: occupied(&grid, &truth), labels: truth.labels, views, pushes })
     }
 }
 
-/// Carries out a push in a copy of the world; `None` when an object drops.
-fn pushed(grid: &Grid, world: &World, tool: &Tool, push: SweptPush) -> Option<PushedSample> {
+/// Carries out a push in a copy of the world; `None` when an object drops, or when the arm has no motion for it.
+fn pushed(grid: &Grid, world: &World, pusher: &Pusher, candidate: Candidate) -> Option<PushedSample> {
     let mut world = world.clone();
-    let outcome = world.execute(tool, &push.push);
+    let outcome = match pusher {
+        Pusher::Free(tool) => world.execute(tool, &candidate.swept.push),
+        Pusher::Arm(arm) => world.execute_motion(&arm.arm, candidate.motion.as_ref()?),
+    };
     if !outcome.dropped.is_empty() {
         return None;
     }
     let truth = TruthMap::of(grid, &world.bodies());
-    Some(PushedSample { push, truth: occupied(grid, &truth), labels: truth.labels })
+    Some(PushedSample { push: candidate.swept, truth: occupied(grid, &truth), labels: truth.labels })
 }
 
 impl Sample for PushSample {

@@ -20,7 +20,7 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
     let ids: Vec<ViewId> = views.views.iter().map(|view| view.id).collect();
     let gains = gain_of_views(&field, views, &ids, RayDensity::FULL);
     let mut fresh = gains.clone();
-    for view in &history.used_views {
+    for view in history.used_views.iter().chain(situation.unreachable) {
         fresh[usize::from(view.0)] = 0.0;
     }
     let pair = best_pair(&field, views, &fresh, RayDensity::FULL);
@@ -35,8 +35,10 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         gains,
         candidates: Vec::new(),
         best_push: None,
+        motion: None,
     };
-    let guard = || push_guard(history, situation.budget, situation.belief.is_complete());
+    let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
+    let guard = || push_guard(history, situation.budget, complete(), settings.quiet_steps);
     match policy {
         PolicyKind::Mem => {
             if let (true, Some(view)) = (history.just_pushed(), history.view_of_push) {
@@ -61,7 +63,8 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         }
         PolicyKind::Saturation => {
             let previous = history.best_gains.last().copied();
-            if previous.is_some_and(|previous| saturated(previous, decision.best_gain().unwrap_or(0.0))) {
+            let current = decision.best_gain().unwrap_or(0.0);
+            if previous.is_some_and(|previous| saturated(previous, current, settings.saturation)) {
                 push_at_random(&mut decision, situation, guard());
             }
         }
@@ -74,6 +77,7 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
 fn choose(decision: &mut Decision, weighed: Weighed, gamma: f32) {
     decision.candidates = weighed.candidates;
     decision.best_push = weighed.best;
+    decision.motion = weighed.motion;
     let Some(best) = weighed.best.map(|at| &decision.candidates[at]) else {
         decision.reason = Reason::NoCandidate;
         return;
@@ -95,6 +99,7 @@ fn push_at_random(decision: &mut Decision, situation: &Situation<'_>, guard: Opt
     let drawn = random_push(situation);
     decision.candidates = drawn.candidates;
     decision.best_push = drawn.best;
+    decision.motion = drawn.motion;
     match drawn.best {
         Some(at) => decision.action = Action::Push(decision.candidates[at].push),
         None => decision.reason = Reason::NoCandidate,
@@ -103,9 +108,9 @@ fn push_at_random(decision: &mut Decision, situation: &Situation<'_>, guard: Opt
 
 /// Views that were not used since the last push; all of them once every one was.
 fn unused_views(situation: &Situation<'_>) -> Vec<ViewId> {
-    let all = situation.views.views.iter().map(|view| view.id);
-    let unused: Vec<ViewId> = all.clone().filter(|view| !situation.history.used_views.contains(view)).collect();
-    if unused.is_empty() { all.collect() } else { unused }
+    let all = situation.offered();
+    let unused: Vec<ViewId> = all.iter().copied().filter(|view| !situation.history.used_views.contains(view)).collect();
+    if unused.is_empty() { all } else { unused }
 }
 
 /// Where to look when no unused view promises anything: the first unused one.

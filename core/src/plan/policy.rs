@@ -66,6 +66,11 @@ impl PolicyKind {
         !matches!(self, Self::RandomPush5Blind | Self::RandomViewPush5)
     }
 
+    /// Whether the policy draws at random (views, pushes, push candidates). The others do the same for every seed.
+    pub fn is_seeded(self) -> bool {
+        !matches!(self, Self::MemNoPush | Self::Oracle)
+    }
+
     /// Name of the belief update that the policy is published with.
     pub fn default_belief(self) -> &'static str {
         match self {

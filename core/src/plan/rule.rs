@@ -17,23 +17,24 @@ pub fn look_or_push(igv: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
 }
 
 /// Why no push is allowed in the next step, or `None` if one is. Of several reasons the lasting ones are named first.
-pub fn push_guard(history: &History, budget: usize, map_complete: bool) -> Option<Reason> {
+/// In the first `quiet_steps` steps, by default [`QUIET_STEPS`], nothing is pushed.
+pub fn push_guard(history: &History, budget: usize, map_complete: bool, quiet_steps: usize) -> Option<Reason> {
     let step = history.actions.len();
     let guards = [
         (history.dropped, Reason::Dropped),
         (map_complete, Reason::MapComplete),
-        (step < QUIET_STEPS, Reason::TooEarly),
+        (step < quiet_steps, Reason::TooEarly),
         (history.just_pushed(), Reason::JustPushed),
         (step + 1 >= budget, Reason::LastStep),
     ];
     guards.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
 }
 
-/// Whether looking no longer gets better or worse: two consecutive best gains differ by less than [`SATURATION`] of the
-/// larger one.
-pub fn saturated(previous: f32, current: f32) -> bool {
+/// Whether looking no longer gets better or worse: two consecutive best gains differ by less than `share` of the larger
+/// one, by default [`SATURATION`].
+pub fn saturated(previous: f32, current: f32, share: f32) -> bool {
     let larger = previous.max(current);
-    larger <= 0.0 || (current - previous).abs() < SATURATION * larger
+    larger <= 0.0 || (current - previous).abs() < share * larger
 }
 
 #[cfg(test)]
@@ -64,31 +65,39 @@ mod tests {
     #[test]
     fn no_push_in_the_first_three_steps_and_none_in_the_last() {
         for step in 0..3 {
-            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false), Some(Reason::TooEarly));
+            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS), Some(Reason::TooEarly));
         }
         for step in 3..19 {
-            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false), None);
+            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS), None);
         }
-        assert_eq!(push_guard(&after(&[LOOK; 19]), 20, false), Some(Reason::LastStep));
+        assert_eq!(push_guard(&after(&[LOOK; 19]), 20, false, QUIET_STEPS), Some(Reason::LastStep));
+        assert_eq!(push_guard(&after(&[LOOK; 3]), 20, false, 4), Some(Reason::TooEarly), "a longer quiet time");
     }
 
     #[test]
     fn no_push_twice_in_a_row() {
-        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH]), 20, false), Some(Reason::JustPushed));
-        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH, LOOK]), 20, false), None);
+        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH]), 20, false, QUIET_STEPS), Some(Reason::JustPushed));
+        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH, LOOK]), 20, false, QUIET_STEPS), None);
     }
 
     #[test]
     fn no_push_on_a_complete_map_nor_after_a_drop() {
-        assert_eq!(push_guard(&after(&[LOOK; 5]), 20, true), Some(Reason::MapComplete));
+        assert_eq!(push_guard(&after(&[LOOK; 5]), 20, true, QUIET_STEPS), Some(Reason::MapComplete));
         let dropped = History { dropped: true, ..after(&[LOOK; 5]) };
-        assert_eq!(push_guard(&dropped, 20, false), Some(Reason::Dropped));
-        assert_eq!(push_guard(&dropped, 20, true), Some(Reason::Dropped), "the lasting reason is named");
+        assert_eq!(push_guard(&dropped, 20, false, QUIET_STEPS), Some(Reason::Dropped));
+        assert_eq!(push_guard(&dropped, 20, true, QUIET_STEPS), Some(Reason::Dropped), "the lasting reason is named");
     }
 
     #[test]
     fn saturation_is_two_percent() {
-        assert!(saturated(100.0, 98.5) && saturated(98.5, 100.0) && saturated(0.0, 0.0));
-        assert!(!saturated(100.0, 97.0) && !saturated(97.0, 100.0) && !saturated(0.0, 1.0));
+        assert!(
+            saturated(100.0, 98.5, SATURATION) && saturated(98.5, 100.0, SATURATION) && saturated(0.0, 0.0, SATURATION)
+        );
+        assert!(saturated(100.0, 97.0, 0.05), "a wider threshold");
+        assert!(
+            !saturated(100.0, 97.0, SATURATION)
+                && !saturated(97.0, 100.0, SATURATION)
+                && !saturated(0.0, 1.0, SATURATION)
+        );
     }
 }

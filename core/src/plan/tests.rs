@@ -6,6 +6,7 @@ use crate::camera::{Intrinsics, MapObservation, View};
 use crate::gain::{GainField, RayDensity, gain_of_views};
 use crate::grid::{Grid, Window};
 use crate::scene::CLASS_COUNT;
+use crate::tool::Tool;
 use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
@@ -102,7 +103,7 @@ struct Table {
     belief: Belief,
     update: Box<dyn BeliefUpdate>,
     views: ViewArray,
-    tool: Tool,
+    pusher: Pusher,
     history: History,
     settings: PlannerSettings,
     seed: u64,
@@ -114,7 +115,7 @@ impl Table {
             belief: half_seen(),
             update: Box::new(Classical),
             views: views(),
-            tool: Tool::standard(),
+            pusher: Pusher::default(),
             history: History::default(),
             settings: PlannerSettings { candidates: 6, ..PlannerSettings::default() },
             seed: 7,
@@ -140,7 +141,8 @@ impl Table {
             belief: &self.belief,
             update: self.update.as_ref(),
             views: &self.views,
-            tool: &self.tool,
+            pusher: &self.pusher,
+            unreachable: &[],
             history: &self.history,
             budget: BUDGET,
             seed: self.seed,
@@ -404,8 +406,14 @@ fn a_history_takes_down_what_was_done() {
     assert_eq!((history.actions.len(), history.used_views.len()), (1, 1));
     assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
 
-    let candidate =
-        CandidateRecord { push: push(), rejection: None, gain: Some(1.0), view: Some(ViewId(3)), reg: None };
+    let candidate = CandidateRecord {
+        push: push(),
+        rejection: None,
+        gain: Some(1.0),
+        view: Some(ViewId(3)),
+        reg: None,
+        motion_s: None,
+    };
     let pushed =
         Decision { action: Action::Push(push()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
     history.record(&pushed, false);

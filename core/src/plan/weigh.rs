@@ -1,10 +1,11 @@
 //! What pushes are worth: IGM and Reg of every candidate.
 
 use super::{CandidateRecord, PlannerSettings, Situation};
+use crate::arm::PushMotion;
 use crate::belief::{Belief, PushPrediction, SweptPush};
 use crate::camera::ViewId;
 use crate::gain::{GainField, RayDensity, RayGains, gain_of_views};
-use crate::push::{Candidate, sample};
+use crate::push::{Candidate, sample_by};
 use crate::rng::{ChaCha8Rng, stream};
 
 /// About how many views rank the candidates: every 5th of 300, all of an array that has fewer than twice as many.
@@ -17,6 +18,8 @@ pub(super) struct Weighed {
     pub candidates: Vec<CandidateRecord>,
     /// Position of the push with the largest gain; `None` when no candidate is feasible.
     pub best: Option<usize>,
+    /// The arm's motion for that push.
+    pub motion: Option<PushMotion>,
 }
 
 /// `Reg = min(0, H_s(belief) - H_s(predicted))`, nats.
@@ -30,8 +33,9 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
 /// list of used views, so every view counts.
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
-    let drawn = sample(belief, situation.tool, settings.candidates, &mut push_stream(situation));
-    let mut candidates: Vec<CandidateRecord> = drawn.iter().map(record_of).collect();
+    let drawn = sample_by(belief, situation.pusher, settings.candidates, &mut push_stream(situation));
+    let mut candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
+    let mut motions: Vec<Option<PushMotion>> = drawn.iter().map(|drawn| drawn.motion.clone()).collect();
     let (feasible, pushes): (Vec<usize>, Vec<SweptPush>) = drawn
         .into_iter()
         .enumerate()
@@ -39,8 +43,9 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         .map(|(at, candidate)| (at, candidate.swept))
         .unzip();
 
-    let ids = |step: usize| views.views.iter().step_by(step).map(|view| view.id).collect::<Vec<ViewId>>();
-    let coarse = ids((views.views.len() / COARSE_VIEWS).max(1));
+    let offered = situation.offered();
+    let ids = |step: usize| offered.iter().copied().step_by(step).collect::<Vec<ViewId>>();
+    let coarse = ids((offered.len() / COARSE_VIEWS).max(1));
     let scale = (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2);
     let rays = RayGains::new(field, views, &coarse, RayDensity::COARSE);
     let mut best: Option<usize> = None;
@@ -66,24 +71,28 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
             candidates[at].view = view;
         }
     }
-    Weighed { candidates, best }
+    let motion = best.and_then(|at| motions[at].take());
+    Weighed { candidates, best, motion }
 }
 
 /// Draws one feasible push at random, with those that were rejected on the way.
 pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
-    let candidates: Vec<CandidateRecord> =
-        sample(situation.belief, situation.tool, 1, &mut push_stream(situation)).iter().map(record_of).collect();
+    let mut drawn = sample_by(situation.belief, situation.pusher, 1, &mut push_stream(situation));
+    let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
-    Weighed { candidates, best }
+    let motion = best.and_then(|at| drawn[at].motion.take());
+    Weighed { candidates, best, motion }
 }
 
 fn push_stream(situation: &Situation<'_>) -> ChaCha8Rng {
     stream(situation.seed, "pushes", situation.history.actions.len() as u64)
 }
 
-fn record_of(candidate: &Candidate) -> CandidateRecord {
+fn record_of(candidate: &Candidate, situation: &Situation<'_>) -> CandidateRecord {
     let rejection = candidate.rejection.clone();
-    CandidateRecord { push: candidate.swept.push, rejection, gain: None, view: None, reg: None }
+    let arm = situation.pusher.arm();
+    let motion_s = arm.and_then(|arm| candidate.motion.as_ref().map(|motion| motion.duration_s(&arm.arm)));
+    CandidateRecord { push: candidate.swept.push, rejection, gain: None, view: None, reg: None, motion_s }
 }
 
 /// The view with the largest gain, the first of equals, and that gain; no view and 0 without views.

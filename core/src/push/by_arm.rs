@@ -5,30 +5,41 @@
 //! backs straight out of the shelf; where that is not free all the way, the planner looks for a way from where the arm
 //! waits to where backing out ended. Contact is allowed only between the gripper and the object that is pushed.
 
-use super::{Rejection, Stage};
+use super::{CONFIDENT, Rejection, STANDOFF_M, Stage};
 use crate::arm::{
-    Arm, ArmTool, DistanceField, Follow, Hit, Joints, PlanSettings, PushMotion, Space, follow_line, level_tool, plan,
+    Arm, ArmTool, DistanceField, Follow, Frame, Hit, Joints, Obstacle, PlanSettings, PushMotion, Space, YAWS_DEG,
+    follow_line, level_tool, plan,
 };
-use crate::belief::{Belief, Patch, beta_mean};
-use crate::grid::VoxelSet;
+use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, beta_mean};
+use crate::grid::{Cell, Grid, Voxel, VoxelSet};
 use crate::rng::ChaCha8Rng;
 use crate::tool::{CLEARANCE_M, Push};
-use nalgebra::Vector3;
+use nalgebra::{Translation3, Vector3};
 
 /// Occupancy probability above which the arm keeps away from a voxel.
 pub const AVOIDED: f32 = 0.7;
-/// Turns of the gripper that are tried, degrees counter-clockwise from straight into the shelf.
-pub const YAWS_DEG: [f64; 5] = [0.0, 20.0, -20.0, 40.0, -40.0];
-/// Ways from the waiting place that the planner is asked for, per push, before there is none.
-const QUERIES: usize = 2;
+/// Ways from the waiting place that the planner searches for, per push, where none is straight.
+const QUERIES: usize = 0;
+/// Distance of the gripper's poses that are checked along a line, metres: two voxels of the standard grid.
+const GRIPPER_STEP_M: f64 = 0.01;
+/// Branches of the inverse that are tried per turn, those nearest to where the arm waits first.
+const BRANCHES: usize = 3;
+/// Ways in that are tried per push.
+const ATTEMPTS: usize = 3;
+/// A query that only tries straight ways.
+const STRAIGHT: PlanSettings = PlanSettings { rounds: 0, shortcuts: 0 };
 /// Work of one query: a push that takes long to plan is one that another push can replace.
-const QUERY: PlanSettings = PlanSettings { rounds: 120, shortcuts: 10 };
+const QUERY: PlanSettings = PlanSettings { rounds: 40, shortcuts: 10 };
 
 /// A belief prepared for checking many pushes by an arm.
 pub struct ArmClearance<'a> {
     tool: &'a ArmTool,
+    grid: Grid,
+    plan: FloorPlan,
     avoided: VoxelSet,
     field: DistanceField,
+    confident: VoxelSet,
+    confident_field: DistanceField,
     ready: Option<Joints>,
 }
 
@@ -36,13 +47,38 @@ impl<'a> ArmClearance<'a> {
     /// Collects the voxels that the arm keeps away from and the distances to them.
     pub fn new(tool: &'a ArmTool, belief: &Belief) -> Self {
         let mut avoided = VoxelSet::empty(&belief.grid);
+        let mut confident = VoxelSet::empty(&belief.grid);
         for (index, a) in belief.occupancy.iter().enumerate() {
-            if beta_mean(*a) > AVOIDED {
+            let probability = beta_mean(*a);
+            if probability > AVOIDED {
                 avoided.insert(index);
+            }
+            if probability >= CONFIDENT {
+                confident.insert(index);
             }
         }
         let field = DistanceField::new(&belief.grid, &avoided);
-        Self { tool, avoided, field, ready: tool.ready }
+        let confident_field = DistanceField::new(&belief.grid, &confident);
+        let plan = FloorPlan::new(belief, AVOIDED);
+        Self { tool, grid: belief.grid, plan, avoided, field, confident, confident_field, ready: tool.ready }
+    }
+
+    /// The object that a frontier voxel belongs to; the gripper may touch what stands on its cells.
+    pub fn target(&self, frontier: Voxel) -> Patch {
+        self.plan.patch(self.grid.cell_index(Cell { x: frontier.x, y: frontier.y }), OBJECT_RADIUS_M)
+    }
+
+    /// The object that a push meets first: the first cell along the tip's track over which something is believed to
+    /// stand, as high as the tip; the cell before the start where there is none.
+    pub fn target_of(&self, push: &Push) -> Patch {
+        let step = 0.5 * self.grid.voxel_m;
+        let steps = (push.length_m / step).ceil() as usize;
+        let track = (0..=steps).map(|i| push.start_point() + push.direction() * (step * i as f32));
+        let met =
+            track.filter_map(|point| self.grid.voxel_at(point)).find(|v| self.avoided.contains(self.grid.index(*v)));
+        let ahead = push.start_point() + push.direction() * STANDOFF_M;
+        let voxel = met.or_else(|| self.grid.voxel_at(ahead)).unwrap_or(Voxel { x: 0, y: 0, z: 0 });
+        self.target(voxel)
     }
 
     /// The arm.
@@ -57,50 +93,87 @@ impl<'a> ArmClearance<'a> {
 
     /// The arm's motion for a push against `target`, or why there is none.
     ///
-    /// Of the turns and branches that fail, the one that came farthest gives the reason.
+    /// The gripper may touch the target and nothing else that the belief is sure of ([`CONFIDENT`]); that is asked first,
+    /// since it does not depend on how the arm bends. All other links keep away from what is likely ([`AVOIDED`]). Of the
+    /// turns and branches that fail, the one that came farthest gives the reason.
     pub fn motion(&self, push: &Push, target: &Patch, rng: &mut ChaCha8Rng) -> Result<PushMotion, Rejection> {
         let Some(ready) = self.ready else { return Err(Rejection::Unreachable { stage: Stage::Start }) };
-        let touchable = |cell: usize| target.contains(cell);
+        let arm = &self.tool.arm;
         let space = self.space();
-        let touching = space.touching(&touchable);
+        let pushing = space.pushing();
+        let tip = push.start_point().map(f64::from);
         let travel = push.direction().map(f64::from) * f64::from(push.length_m);
+        // Straight out of the shelf, and on until the tip is as far before it as where the arm waits.
+        let least = tip.y + f64::from(CLEARANCE_M);
+        let out = least.max(tip.y - arm.world_from_tool(&ready).translation.y).max(0.0);
         let mut reason = Reason { depth: 0, rejection: Rejection::Unreachable { stage: Stage::Start } };
         let mut goals: Vec<Attempt> = Vec::new();
         for yaw in YAWS_DEG {
-            let pose = level_tool(&push.start_point().map(f64::from), yaw.to_radians());
-            for start in self.tool.arm.inverse(&pose, &ready) {
-                if let Some(hit) = touching.hit(&start) {
+            let pose = level_tool(&tip, yaw.to_radians());
+            if let Some(hit) = self.gripper_hit(&pose, &Vector3::zeros(), target).1 {
+                reason.deeper(1, blocked(Stage::Start, hit));
+                continue;
+            }
+            if let Some(hit) = self.gripper_hit(&pose, &travel, target).1 {
+                reason.deeper(2, blocked(Stage::Push, hit));
+                continue;
+            }
+            let (free, out_hit) = self.gripper_hit(&pose, &Vector3::new(0.0, -out, 0.0), target);
+            for start in arm.inverse(&pose, &ready).into_iter().take(BRANCHES) {
+                if goals.len() == ATTEMPTS {
+                    break;
+                }
+                if let Some(hit) = pushing.hit(&start) {
                     reason.deeper(1, blocked(Stage::Start, hit));
                     continue;
                 }
-                let (line, hit) = self.follow(&touching, &start, &travel);
+                let (line, hit) = self.follow(&pushing, &start, &travel);
                 if !line.complete {
                     let unreachable = Rejection::Unreachable { stage: Stage::Push };
                     reason.deeper(2, hit.map_or(unreachable, |hit| blocked(Stage::Push, hit)));
                     continue;
                 }
-                let out = Vector3::new(0.0, -(push.start[1] + CLEARANCE_M).max(0.0) as f64, 0.0);
-                let (back, hit) = self.follow(&touching, &start, &out);
-                let blocker = hit.map(|hit| blocked(Stage::WayIn, hit));
-                let complete = back.complete;
+                let (back, hit) = self.follow(&pushing, &start, &Vector3::new(0.0, -out * free, 0.0));
+                let ended = back.path.last().map_or(tip.y, |last| arm.world_from_tool(last).translation.y);
+                let is_out = tip.y - ended >= least - 1e-6;
+                let hit = hit.or_else(|| out_hit.clone());
+                let blocker = (!is_out).then(|| hit.map_or(Rejection::NoWay, |hit| blocked(Stage::WayIn, hit)));
                 goals.push(Attempt { push: line.path, chain: back.path, blocker });
-                // A way that leads straight out is as good as it gets; the planner need not be asked for others.
-                if complete && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], rng) {
+                // A way that leads straight out and on is as good as it gets; the planner need not search for others.
+                if is_out && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], STRAIGHT, rng) {
                     return Ok(motion);
-                }
-                if complete {
-                    goals.pop();
-                    reason.deeper(3, Rejection::NoWay);
                 }
             }
         }
+        goals.sort_by_key(|attempt| attempt.blocker.is_some());
         for attempts in goals.chunks(1).take(QUERIES) {
-            if let Some(motion) = self.finish(&space, &ready, attempts, rng) {
+            if let Some(motion) = self.finish(&space, &ready, attempts, QUERY, rng) {
                 return Ok(motion);
             }
             reason.deeper(3, attempts[0].blocker.clone().unwrap_or(Rejection::NoWay));
         }
         Err(reason.rejection)
+    }
+
+    /// What the gripper meets that it may not touch when it is moved along `travel`, and the share of the way until there.
+    fn gripper_hit(&self, from: &Frame, travel: &Vector3<f64>, target: &Patch) -> (f64, Option<Hit>) {
+        let height = self.grid.dims[2];
+        let blocks = |index: usize| self.confident.contains(index) && !target.contains(index / height);
+        let steps = (travel.norm() / GRIPPER_STEP_M).ceil().max(1.0) as usize;
+        let first = usize::from(travel.norm() > 0.0);
+        for step in first..=steps {
+            let share = step as f64 / steps as f64;
+            let pose = Frame::from_parts(Translation3::from(from.translation.vector + travel * share), from.rotation);
+            if let Some(index) = self.tool.arm.gripper_touches(&pose, &self.confident_field, blocks) {
+                let at = self.grid.center(self.grid.voxel(index)).coords.into();
+                let link = self.tool.arm.gripper_name().to_owned();
+                return ((step - first) as f64 / steps as f64, Some(Hit { link, obstacle: Obstacle::Map { at } }));
+            }
+            if first == 0 {
+                break;
+            }
+        }
+        (1.0, None)
     }
 
     /// Follows a line as far as it is free; what stopped it, if something did.
@@ -119,10 +192,11 @@ impl<'a> ArmClearance<'a> {
         space: &Space<'_>,
         ready: &Joints,
         attempts: &[Attempt],
+        settings: PlanSettings,
         rng: &mut ChaCha8Rng,
     ) -> Option<PushMotion> {
         let chains: Vec<Vec<Joints>> = attempts.iter().map(|attempt| attempt.chain.clone()).collect();
-        let planned = plan(space, ready, &chains, QUERY, rng)?;
+        let planned = plan(space, ready, &chains, settings, rng)?;
         let start = planned.path.last()?;
         let attempt = attempts.iter().find(|attempt| attempt.push.first() == Some(start))?;
         Some(PushMotion::new(&self.tool.arm, &planned.path, &attempt.push))

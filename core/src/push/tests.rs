@@ -179,3 +179,12 @@ fn rejections_read_as_they_are_filed() {
     let json = serde_json::to_string(&Rejection::PathBlocked { at: [0.5, 0.25, 0.125] }).expect("json");
     assert_eq!(json, r#"{"kind":"path_blocked","at":[0.5,0.25,0.125]}"#);
 }
+
+#[test]
+fn a_rejection_by_the_arms_own_link_comes_back_from_a_file() {
+    let hit = Hit { link: "forearm".to_owned(), obstacle: Obstacle::Arm { link: "base".to_owned() } };
+    let rejection = Rejection::ArmBlocked { stage: Stage::Start, hit };
+    let text = serde_json::to_string(&rejection).expect("written");
+    assert_eq!(text.matches("\"link\"").count(), 1, "{text}");
+    assert_eq!(serde_json::from_str::<Rejection>(&text).expect("read"), rejection);
+}

@@ -63,6 +63,9 @@ pub(super) fn problems(shelf: &Shelf, bodies: &[Body]) -> impl Iterator<Item = P
 pub(super) fn check(scene: &Scene, catalog: &Catalog, places: &Places) -> Result<Vec<Warning>> {
     check_name(scene, places)?;
     check_shelf(&scene.shelf, places)?;
+    if let Some(fault) = scene.robot.fault(&scene.shelf) {
+        return Err(places.key("robot.base", fault));
+    }
     for key in scene.meshes.keys() {
         check_mesh_key(scene, catalog, key, places)?;
     }

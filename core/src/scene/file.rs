@@ -11,6 +11,11 @@
 //! [meshes]                          # optional: class = mesh file, relative to this file
 //! chips_can = "chips_can.obj"
 //!
+//! [robot]                           # optional: the arm before the shelf
+//! base = [0.0, -0.70, -0.015]       # metres: origin of its base, as high as the table
+//! yaw_deg = 0.0                     # turn of the base about z
+//! urdf = "my_arm.urdf"              # an arm of one's own, relative to this file; else the UR5 that Nudge has
+//!
 //! [[object]]
 //! class = "chips_can"
 //! position = [0.1, 0.2]             # metres: centre of the footprint on the board
@@ -20,7 +25,7 @@
 //! ```
 
 use super::mesh::load_mesh;
-use super::{Catalog, MeshShape, Object, Scene, Shelf, Warning, check};
+use super::{Catalog, MeshShape, Object, RobotFile, RobotPlacement, Scene, Shelf, Warning, check};
 use crate::files::write_atomically;
 use crate::{Error, Result};
 use serde::Deserialize;
@@ -45,6 +50,7 @@ struct RawScene {
     shelf: RawShelf,
     #[serde(default)]
     meshes: BTreeMap<String, Spanned<String>>,
+    robot: Option<Spanned<RawRobot>>,
     #[serde(default)]
     object: Vec<Spanned<RawObject>>,
 }
@@ -55,6 +61,14 @@ struct RawShelf {
     size: Spanned<[f64; 3]>,
     voxel_m: Option<Spanned<f64>>,
     column_closure: Option<bool>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawRobot {
+    urdf: Option<Spanned<String>>,
+    base: Option<Spanned<[f64; 3]>>,
+    yaw_deg: Option<Spanned<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -172,6 +186,7 @@ impl Scene {
             shelf,
             objects: raw.object.into_iter().map(object).collect(),
             meshes: BTreeMap::new(),
+            robot: RobotPlacement::default(),
         };
         let mut warnings = Vec::new();
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -197,6 +212,17 @@ impl Scene {
             let name = name_object(at, &object.class);
             warnings.extend(report.warnings.iter().map(|warning| format!("mesh of {name}: {warning}")));
             scene.meshes.insert(file.clone(), mesh);
+        }
+        if let Some(robot) = raw.robot.map(Spanned::into_inner) {
+            let standard = RobotPlacement::default();
+            scene.robot = RobotPlacement {
+                base: robot.base.map_or(standard.base, |base| base.get_ref().map(|v| v as f32)),
+                yaw_deg: robot.yaw_deg.map_or(standard.yaw_deg, |yaw| yaw.into_inner() as f32),
+                urdf: robot
+                    .urdf
+                    .map(|file| RobotFile::read(&folder.join(file.get_ref()), file.get_ref()))
+                    .transpose()?,
+            };
         }
         warnings.extend(check::check(&scene, catalog, &places)?);
         Ok((scene, warnings))
@@ -231,6 +257,16 @@ impl Scene {
         for (class, mesh) in of_classes {
             let _ = writeln!(text, "{class} = {}", quoted(&mesh.source));
         }
+        let (robot, standard) = (&self.robot, RobotPlacement::default());
+        if *robot != standard {
+            let _ = writeln!(text, "\n[robot]\nbase = {:?}", robot.base);
+            if robot.yaw_deg != standard.yaw_deg {
+                let _ = writeln!(text, "yaw_deg = {:?}", robot.yaw_deg);
+            }
+            if let Some(file) = &robot.urdf {
+                let _ = writeln!(text, "urdf = {}", quoted(&file.source));
+            }
+        }
         for object in &self.objects {
             let _ = write!(text, "\n[[object]]\nclass = {}\nposition = {:?}\n", quoted(&object.class), object.position);
             if object.yaw_deg != 0.0 {
@@ -251,6 +287,10 @@ impl Scene {
         let folder = folder_of(path);
         if let Some((key, mesh)) = self.meshes.iter().find(|(_, mesh)| !folder.join(&mesh.source).is_file()) {
             let message = format!("mesh of {key}: {} is not there; save beside the meshes", mesh.source);
+            return Err(Error::input(path, "", message));
+        }
+        if let Some(file) = self.robot.urdf.as_ref().filter(|file| !folder.join(&file.source).is_file()) {
+            let message = format!("robot: {} is not there; save beside the URDF file", file.source);
             return Err(Error::input(path, "", message));
         }
         write_atomically(path, self.to_toml().as_bytes())
@@ -292,6 +332,20 @@ fn lines(raw: &RawScene, text: &str) -> BTreeMap<String, usize> {
     }
     for (class, file) in &raw.meshes {
         note(format!("meshes.{class}"), file.span().start);
+    }
+    if let Some(robot) = &raw.robot {
+        note("robot".into(), robot.span().start);
+        let robot = robot.get_ref();
+        let spans = [
+            ("base", robot.base.as_ref().map(Spanned::span)),
+            ("yaw_deg", robot.yaw_deg.as_ref().map(Spanned::span)),
+            ("urdf", robot.urdf.as_ref().map(Spanned::span)),
+        ];
+        for (key, span) in spans {
+            if let Some(span) = span {
+                note(format!("robot.{key}"), span.start);
+            }
+        }
     }
     for (at, object) in raw.object.iter().enumerate() {
         note(format!("object.{at}"), object.span().start);

@@ -9,7 +9,9 @@
 mod placeable;
 
 use super::file::Places;
-use super::{Catalog, Class, ClassId, MeshShape, OBJECT_CLASS_COUNT, Object, Scene, Shelf, check, outline};
+use super::{
+    Catalog, Class, ClassId, MeshShape, OBJECT_CLASS_COUNT, Object, RobotPlacement, Scene, Shelf, check, outline,
+};
 use crate::rng::{ChaCha8Rng, stream};
 use crate::{Error, Result};
 use placeable::{FloorGrid, FloorMask};
@@ -123,6 +125,7 @@ pub fn generate(catalog: &Catalog, config: &GenerateConfig, seed: u64) -> Result
         shelf: config.shelf,
         objects: config.keep.clone(),
         meshes: config.meshes.clone(),
+        robot: RobotPlacement::default(),
     };
     let mut standing: Vec<Standing> = Vec::new();
     for (body, object) in scene.bodies(catalog)?.iter().zip(&scene.objects) {

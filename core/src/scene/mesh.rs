@@ -73,6 +73,11 @@ pub struct MeshReport {
     pub warnings: Vec<Warning>,
 }
 
+/// All corners of a mesh file (OBJ, STL, GLB) as they are in the file: for who only needs its hull.
+pub(crate) fn read_mesh_points(path: &Path) -> Result<Vec<Point>> {
+    Ok(read::read(path)?.into_iter().flat_map(|group| group.points).collect())
+}
+
 /// Reads a mesh (OBJ, STL, GLB) and makes a shape of it, with a report of what was done.
 ///
 /// `source` is what the shape notes as its file (relative to a scene); `class` gives mass and helps to tell units.

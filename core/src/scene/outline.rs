@@ -72,6 +72,23 @@ pub fn separation(a: &[[f32; 2]], b: &[[f32; 2]]) -> f32 {
     one_sided(a, b).max(one_sided(b, a))
 }
 
+/// The shortest move of `b` that takes it out of `a`, metres; `None` if they do not overlap.
+pub fn way_out(a: &[[f32; 2]], b: &[[f32; 2]]) -> Option<[f32; 2]> {
+    let deepest = |a: &[[f32; 2]], b: &[[f32; 2]]| {
+        edges(a)
+            .filter_map(|edge| {
+                let normal = outward(edge)?;
+                let nearest = b.iter().map(|p| dot(normal, *p)).fold(f32::INFINITY, f32::min);
+                Some((nearest - dot(normal, edge.0), normal))
+            })
+            .max_by(|one, other| one.0.total_cmp(&other.0))
+    };
+    let ((from_a, normal_a), (from_b, normal_b)) = (deepest(a, b)?, deepest(b, a)?);
+    let (gap, move_of_b) =
+        if from_a >= from_b { (from_a, normal_a.map(|n| -from_a * n)) } else { (from_b, normal_b.map(|n| from_b * n)) };
+    (gap < 0.0).then_some(move_of_b)
+}
+
 /// Where the origin of `moving` may not be if it is to stay clear of `fixed`: the Minkowski sum of `fixed` and the
 /// mirrored `moving`, a convex outline whose edges are the edges of both, sorted by direction.
 pub fn obstacle(fixed: &[[f32; 2]], moving: &[[f32; 2]]) -> Vec<[f32; 2]> {
@@ -136,6 +153,21 @@ mod tests {
     use proptest::prelude::*;
 
     const SQUARE: [[f32; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+
+    #[test]
+    fn the_way_out_is_the_shortest_and_leaves_them_touching() {
+        let moved = |[x, y]: [f32; 2]| SQUARE.map(|p| [p[0] + x, p[1] + y]);
+        assert_eq!(way_out(&SQUARE, &moved([2.1, 0.0])), None);
+        let close = |a: Option<[f32; 2]>, b: [f32; 2]| {
+            let a = a.expect("they overlap");
+            assert!((a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-5, "{a:?} is not {b:?}");
+        };
+        close(way_out(&SQUARE, &moved([1.5, 0.2])), [0.5, 0.0]);
+        close(way_out(&SQUARE, &moved([0.1, -1.7])), [0.0, -0.3]);
+        let diamond = [[1.5, 0.0], [2.5, 1.0], [1.5, 2.0], [0.5, 1.0]];
+        close(way_out(&SQUARE, &diamond), [0.25, 0.25]);
+        close(way_out(&diamond, &SQUARE), [-0.25, -0.25]);
+    }
 
     #[test]
     fn area_and_growth_of_a_square() {

@@ -65,6 +65,7 @@ impl World {
         outcome.link_contacts = notes.contacts;
         outcome.against_wall = notes.against_wall;
         outcome.arm_in_shelf_m = notes.arm_in_shelf_m;
+        outcome.arm_s = notes.steps as f32 * TIME_STEP_S;
         outcome
     }
 
@@ -87,6 +88,7 @@ impl World {
             let at_s = step as f64 * f64::from(TIME_STEP_S);
             joints = motion.at(at_s).unwrap_or(joints);
             let blocked = self.physics.step_arm(arm, &joints);
+            notes.steps += 1;
             self.take_notes(notes);
             if blocked && step < steps {
                 return Ride { joints, blocked_s: Some(at_s) };
@@ -123,6 +125,8 @@ struct Notes {
     contacts: Vec<LinkContact>,
     against_wall: Vec<ObjectId>,
     arm_in_shelf_m: f32,
+    /// Time steps in which the arm moved.
+    steps: u32,
 }
 
 /// The stops of a motion that were passed before it was blocked.

@@ -5,12 +5,14 @@
 
 use super::hull::Hull;
 use super::shelf_panels;
+use crate::arm::{Arm, Joints, Role, pose_of};
 use crate::scene::{Body, Shelf};
 use crate::solid::{ConvexPart, Solid};
 use crate::tool::Tool;
 use crate::{Point, Pose, Vector};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use rapier3d::math::{Pose as RapierPose, Rotation as RapierRotation, Vector as RapierVector};
+use rapier3d::parry::bounding_volume::BoundingVolume;
 use rapier3d::parry::shape::ConvexPolyhedron;
 use rapier3d::pipeline::PhysicsWorld;
 use rapier3d::prelude::{
@@ -41,11 +43,25 @@ const SHELF: Group = Group::GROUP_1;
 const OBJECT: Group = Group::GROUP_2;
 const TOOL: Group = Group::GROUP_3;
 
+/// A rigid body of the arm.
+#[derive(Clone)]
+struct ArmBody {
+    handle: RigidBodyHandle,
+    /// Which of the arm's bodies it is.
+    number: usize,
+    /// Its colliders, each with its link and what that is for.
+    parts: Vec<(ColliderHandle, String, Role)>,
+}
+
 /// All that the simulation remembers between two steps.
 pub(super) struct Physics {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
     tool: Option<RigidBodyHandle>,
+    /// The arm's bodies while it moves.
+    arm: Vec<ArmBody>,
+    /// Board first, then back, left, right, ceiling.
+    panels: Vec<ColliderHandle>,
     blocked_steps: u32,
     steps: u64,
 }
@@ -72,6 +88,8 @@ impl Clone for Physics {
             },
             handles: self.handles.clone(),
             tool: self.tool,
+            arm: self.arm.clone(),
+            panels: self.panels.clone(),
             blocked_steps: self.blocked_steps,
             steps: self.steps,
         }
@@ -89,16 +107,17 @@ impl Physics {
         parameters.normalized_max_linear_velocity = 50.0;
         // Five millimetres of stale contacts are too many beside a corner of a box.
         parameters.normalized_contact_recycle_distance = 0.005;
+        let mut panels = Vec::new();
         for panel in shelf_panels(shelf) {
             let (center, half) = (nalgebra::center(&panel.min, &panel.max), panel.size() * 0.5);
             let collider = ColliderBuilder::cuboid(half.x, half.y, half.z)
                 .translation(to_rapier(center.coords))
                 .friction(SHELF_FRICTION)
                 .collision_groups(groups(SHELF, OBJECT));
-            world.insert_collider(collider, None);
+            panels.push(world.insert_collider(collider, None));
         }
         let handles = bodies.iter().map(|body| insert_body(&mut world, body)).collect();
-        Self { world, handles, tool: None, blocked_steps: 0, steps: 0 }
+        Self { world, handles, tool: None, arm: Vec::new(), panels, blocked_steps: 0, steps: 0 }
     }
 
     /// Starts an action. Workspaces are renewed, so that a clone, which cannot copy them, starts from the same state.
@@ -180,7 +199,12 @@ impl Physics {
             body.set_next_kinematic_position(to_rapier_pose(&Tool::world_from_tool(tip)));
         }
         self.step();
-        let blocked = self.tool_force_n() > BLOCKING_FORCE_N;
+        self.note_force(self.tool_force_n())
+    }
+
+    /// Whether what pushes has met more than [`BLOCKING_FORCE_N`] for a while, the last step included.
+    fn note_force(&mut self, force_n: f32) -> bool {
+        let blocked = force_n > BLOCKING_FORCE_N;
         self.blocked_steps = if blocked { self.blocked_steps + 1 } else { 0 };
         if self.blocked_steps >= BLOCKED_STEPS {
             self.blocked_steps = 0;
@@ -193,6 +217,116 @@ impl Physics {
     pub(super) fn tool_force_n(&self) -> f32 {
         let Some(body) = self.tool.and_then(|handle| self.world.bodies.get(handle)) else { return 0.0 };
         let pairs = body.colliders().iter().flat_map(|&c| self.world.narrow_phase.contact_pairs_with(c));
+        pairs.map(|pair| pair.total_impulse_magnitude()).sum::<f32>() / TIME_STEP_S
+    }
+
+    /// Puts the arm's links where `joints` has them. The base touches nothing and is left out.
+    pub(super) fn insert_arm(&mut self, arm: &Arm, joints: &Joints) {
+        let poses = arm.body_poses(joints);
+        for (number, parts) in arm.bodies.iter().enumerate().skip(1) {
+            let pose = to_rapier_pose(&pose_of(&poses[number]));
+            let handle = self.world.insert_body(RigidBodyBuilder::kinematic_position_based().pose(pose));
+            let mut placed = Vec::with_capacity(parts.len());
+            for part in parts {
+                if let Some(shape) = shape_of(&part.shape) {
+                    let collider =
+                        ColliderBuilder::new(shape).friction(TOOL_FRICTION).collision_groups(groups(TOOL, OBJECT));
+                    let collider = self.world.insert_collider(collider, Some(handle));
+                    placed.push((collider, part.link.clone(), part.role));
+                }
+            }
+            self.arm.push(ArmBody { handle, number, parts: placed });
+        }
+    }
+
+    pub(super) fn remove_arm(&mut self) {
+        for body in std::mem::take(&mut self.arm) {
+            self.world.remove_body(body.handle);
+        }
+    }
+
+    /// One time step in which the arm goes to `joints`; returns whether it has been blocked for a while.
+    pub(super) fn step_arm(&mut self, arm: &Arm, joints: &Joints) -> bool {
+        let poses = arm.body_poses(joints);
+        for body in &self.arm {
+            if let Some(rigid) = self.world.bodies.get_mut(body.handle) {
+                rigid.set_next_kinematic_position(to_rapier_pose(&pose_of(&poses[body.number])));
+            }
+        }
+        self.step();
+        let parts = self.arm.iter().flat_map(|body| &body.parts);
+        let force_n = parts.map(|(collider, ..)| self.force_on_n(*collider)).sum::<f32>();
+        self.note_force(force_n)
+    }
+
+    /// Links (not the gripper) that touch an object now, with the object's number.
+    pub(super) fn link_contacts(&self) -> Vec<(&str, usize)> {
+        let mut contacts = Vec::new();
+        for (collider, link, role) in self.arm.iter().flat_map(|body| &body.parts) {
+            if *role == Role::Tool {
+                continue;
+            }
+            for pair in self.world.narrow_phase.contact_pairs_with(*collider) {
+                let other = if pair.collider1 == *collider { pair.collider2 } else { pair.collider1 };
+                if pair.total_impulse_magnitude() > 0.0
+                    && let Some(at) = self.object_of(other)
+                {
+                    contacts.push((link.as_str(), at));
+                }
+            }
+        }
+        contacts
+    }
+
+    /// Objects that press against a wall (not the board) with more than `force_n` newtons.
+    pub(super) fn pressed_against_walls(&self, force_n: f32) -> Vec<usize> {
+        let mut pressed = Vec::new();
+        for &panel in self.panels.iter().skip(1) {
+            for pair in self.world.narrow_phase.contact_pairs_with(panel) {
+                let other = if pair.collider1 == panel { pair.collider2 } else { pair.collider1 };
+                if pair.total_impulse_magnitude() / TIME_STEP_S > force_n
+                    && let Some(at) = self.object_of(other)
+                {
+                    pressed.push(at);
+                }
+            }
+        }
+        pressed
+    }
+
+    /// How deep a link of the arm is in a panel of the shelf now, metres.
+    pub(super) fn arm_in_shelf_m(&self) -> f32 {
+        let mut deepest = 0.0_f32;
+        for (collider, ..) in self.arm.iter().flat_map(|body| &body.parts) {
+            let Some(part) = self.world.colliders.get(*collider) else { continue };
+            let near = part.compute_aabb();
+            for panel in self.panels.iter().filter_map(|panel| self.world.colliders.get(*panel)) {
+                if !panel.compute_aabb().intersects(&near) {
+                    continue;
+                }
+                let contact = rapier3d::parry::query::contact(
+                    part.position(),
+                    part.shape(),
+                    panel.position(),
+                    panel.shape(),
+                    0.0,
+                );
+                if let Ok(Some(contact)) = contact {
+                    deepest = deepest.max(-contact.dist);
+                }
+            }
+        }
+        deepest
+    }
+
+    /// The object that a collider belongs to.
+    fn object_of(&self, collider: ColliderHandle) -> Option<usize> {
+        let parent = self.world.colliders.get(collider)?.parent()?;
+        self.handles.iter().position(|handle| *handle == parent)
+    }
+
+    fn force_on_n(&self, collider: ColliderHandle) -> f32 {
+        let pairs = self.world.narrow_phase.contact_pairs_with(collider);
         pairs.map(|pair| pair.total_impulse_magnitude()).sum::<f32>() / TIME_STEP_S
     }
 

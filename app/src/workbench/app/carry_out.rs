@@ -1,26 +1,21 @@
 //! What is done with the commands that panels, menus and shortcuts give.
 
-use super::{Answer, App, ChosenFor, Opening};
+use super::{App, ChosenFor, Opening, Pair};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::{Dialog, Reply};
-use crate::workbench::export;
-use crate::workbench::jobs::JobKind;
 use crate::workbench::model::{GainSource, LayoutKind, Preview};
-use crate::workbench::session::{Activity, SessionId};
+use crate::workbench::session::{Activity, Session, SessionId};
 use crate::workbench::worker::{Begin, Order, Worker};
 use nudge_core::belief::SweptPush;
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
-use nudge_core::plan::{Action, Decision, Reason};
+use nudge_core::plan::{Action, Decision, PolicyKind, Reason};
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
 use nudge_core::tool::Push;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// How many paths are remembered.
-const RECENT: usize = 12;
 
 impl App {
     pub(super) fn carry_out(&mut self, command: Command) {
@@ -28,29 +23,37 @@ impl App {
             Command::Menu(entry) => self.menu(entry),
             Command::Open(path) => self.open(&path),
             Command::Start => self.start_chosen(),
-            Command::Show(id) => self.model.show(id),
+            Command::Show(id) => {
+                self.model.browsing = false;
+                self.model.show(id);
+            }
             Command::Close(id) => self.close(id),
             Command::CompareWith(other) => {
                 self.model.other = other;
                 if other.is_some() {
-                    self.model.kept.layout = LayoutKind::Compare;
+                    self.lay_out(LayoutKind::Compare);
                 }
             }
             Command::GoTo(step) => {
-                let last = self.model.session().map_or(0, |session| session.steps());
-                self.model.cursor = step.min(last);
-                self.model.candidate = None;
+                let step = step.min(self.model.last_step());
+                if step != self.model.cursor {
+                    self.model.candidate = None;
+                }
+                self.model.cursor = step;
             }
-            Command::Layout(layout) => self.model.kept.layout = layout,
-            Command::Decide => self.order(|_| Some(Order::Decide), Activity::Deciding),
-            Command::DoIt => self.order(
-                |pending| Some(pending.map_or(Order::Decide, |decision| Order::Act(decision.clone()))),
-                Activity::Acting,
-            ),
+            Command::Layout(layout) => self.lay_out(layout),
+            Command::Decide => self.order(Order::Decide, Activity::Deciding),
+            Command::DoIt => match self.model.session().and_then(|session| session.pending.clone()) {
+                Some(decision) => self.order(Order::Act(decision), Activity::Acting),
+                None => self.order(Order::Decide, Activity::Deciding),
+            },
             Command::DoInstead(action) => self.do_instead(action),
-            Command::Act(decision) => self.order(move |_| Some(Order::Act(decision.clone())), Activity::Acting),
-            Command::Run => self.order(|_| Some(Order::Run), Activity::Running),
+            Command::Act(decision) => self.order(Order::Act(decision), Activity::Acting),
+            Command::Run => self.order(Order::Run, Activity::Running),
+            Command::RunBoth => self.run_both(),
+            Command::Pause => self.stop(Worker::pause),
             Command::Cancel => self.cancel(),
+            Command::CancelTask(at) => self.tasks.under_way().get(at).into_iter().for_each(|task| task.cancel()),
             Command::Branch => self.branch(),
             Command::Preview(push) => self.preview(push),
             Command::GainOf(view) => self.gain_of(view),
@@ -62,32 +65,48 @@ impl App {
             }
             Command::Note(step, text) => self.note(step, text),
             Command::Overrule(step, object, verdict) => self.overrule(step, object, verdict),
-            Command::CloseRecording => {
-                self.model.recording = None;
-                if let Some(viewer) = &mut self.viewer {
-                    viewer.close_recording();
-                }
-            }
+            Command::CloseRecording => self.close_recording(),
             Command::TryScene => self.try_scene(),
+            Command::EditScene => self.edit_scene(),
+            Command::Browse(browsing) => self.model.browsing = browsing,
             Command::Tell(level, text) => self.model.toasts.tell(level, text),
         }
     }
 
-    fn tell(&mut self, level: Level, text: impl Into<String>) {
+    pub(super) fn tell(&mut self, level: Level, text: impl Into<String>) {
         self.model.toasts.tell(level, text);
     }
 
-    fn menu(&mut self, entry: MenuCommand) {
+    /// Shows another layout; only a comparison goes on after the shown episode's end.
+    fn lay_out(&mut self, layout: LayoutKind) {
+        self.model.kept.layout = layout;
+        self.model.browsing = false;
+        self.close_recording();
+        self.model.cursor = self.model.cursor.min(self.model.last_step());
+    }
+
+    fn close_recording(&mut self) {
+        if self.model.recording.take().is_some()
+            && let Some(viewer) = &mut self.viewer
+        {
+            viewer.close_recording();
+        }
+    }
+
+    pub(super) fn menu(&mut self, entry: MenuCommand) {
         match entry {
+            MenuCommand::Scenes => {
+                if self.model.kept.layout == LayoutKind::Author {
+                    self.lay_out(LayoutKind::Episode);
+                }
+                self.model.browsing = true;
+            }
             MenuCommand::OpenScene | MenuCommand::OpenEpisode => self.browse(entry, ChosenFor::Opening),
             MenuCommand::Save => self.save(),
             MenuCommand::SaveSceneAs
             | MenuCommand::ExportEpisode
             | MenuCommand::ExportTables
-            | MenuCommand::ExportPicture => {
-                let proposal = self.proposal(entry);
-                self.dialog = Some(Dialog::write_to(entry, &proposal));
-            }
+            | MenuCommand::ExportPicture => self.ask_where(entry),
             MenuCommand::CloseEpisode => self.model.shown.into_iter().for_each(|id| self.close(id)),
             MenuCommand::Quit => self.quit_asked = true,
             MenuCommand::Undo => self.model.author.undo(),
@@ -101,13 +120,16 @@ impl App {
             MenuCommand::Decide => self.carry_out(Command::Decide),
             MenuCommand::DoIt => self.carry_out(Command::DoIt),
             MenuCommand::Run => self.carry_out(Command::Run),
+            MenuCommand::RunBoth => self.carry_out(Command::RunBoth),
+            MenuCommand::Pause => self.carry_out(Command::Pause),
             MenuCommand::Cancel => {
                 if self.dialog.take().is_none() {
                     self.cancel();
                 }
             }
             MenuCommand::Branch => self.branch(),
-            MenuCommand::Layout(layout) => self.model.kept.layout = layout,
+            MenuCommand::EditScene => self.edit_scene(),
+            MenuCommand::Layout(layout) => self.lay_out(layout),
             MenuCommand::ToggleTheme => self.model.kept.light = !self.model.kept.light,
             MenuCommand::ZoomIn => self.zoom_asked = Some(1.1),
             MenuCommand::ZoomOut => self.zoom_asked = Some(1.0 / 1.1),
@@ -134,89 +156,42 @@ impl App {
                     self.quit_asked = true;
                 }
             }
-            Reply::Write(what, path) => {
+            Reply::Write(what, path, part) => {
                 self.dialog = None;
-                self.write(what, path);
+                self.write(what, path, part);
+            }
+            Reply::Export(id) => {
+                self.carry_out(Command::Show(id));
+                self.ask_where(MenuCommand::ExportEpisode);
+            }
+            Reply::Reopen(id) => {
+                self.dialog = None;
+                if let Some(path) = self.model.session_of(id).map(|session| session.path.clone()) {
+                    self.close(id);
+                    self.open(&path);
+                }
             }
         }
     }
 
-    /// Opens the system's dialog on a thread of its own, since it blocks.
-    fn browse(&mut self, what: MenuCommand, purpose: ChosenFor) {
-        let (answers, wake) = (self.answers.0.clone(), self.wake.clone());
-        let started = std::thread::Builder::new().name("file dialog".to_owned()).spawn(move || {
-            let dialog = rfd::FileDialog::new().set_title(what.title().trim_end_matches('…'));
-            let chosen = match what {
-                MenuCommand::OpenScene => dialog.add_filter("Scene", &["toml"]).pick_file(),
-                MenuCommand::OpenEpisode | MenuCommand::ExportTables | MenuCommand::ExportEpisode => {
-                    dialog.pick_folder()
-                }
-                MenuCommand::SaveSceneAs => dialog.add_filter("Scene", &["toml"]).save_file(),
-                _ => dialog.add_filter("Picture", &["png"]).save_file(),
-            };
-            if let Some(path) = chosen {
-                let _ = answers.send(Answer::Chosen(purpose, path));
-                wake();
-            }
-        });
-        if let Err(error) = started {
-            self.tell(Level::Error, format!("No file dialog: {error}"));
-        }
-    }
-
-    fn open(&mut self, path: &Path) {
-        let is = |extension: &str| path.extension().is_some_and(|other| other.eq_ignore_ascii_case(extension));
-        if is("toml") {
-            if self.start(path) {
-                self.remember(path);
-            }
-        } else if is("rrd") {
-            match (&mut self.viewer, path.is_file()) {
-                (_, false) => self.tell(Level::Error, format!("{}: no such file", path.display())),
-                (None, true) => {
-                    self.tell(Level::Error, format!("{}: recordings need a graphics driver", path.display()));
-                }
-                (Some(viewer), true) => {
-                    viewer.open_recording(path);
-                    self.model.recording = Some(path.to_owned());
-                    self.remember(path);
-                }
-            }
-        } else {
-            let directory = if path.is_file() { path.parent().unwrap_or(path) } else { path };
-            if directory.join("episode.json").is_file() {
-                let title = directory.display().to_string();
-                let begin = Begin::Open { path: directory.to_owned(), look_only: self.options.look_only };
-                self.spawn(title, begin);
-                self.remember(directory);
-            } else {
-                let message = "is neither a scene (.toml), nor an episode's directory, nor a recording (.rrd)";
-                self.tell(Level::Error, format!("{}: {message}", path.display()));
-            }
-        }
-    }
-
-    fn remember(&mut self, path: &Path) {
-        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        let recent = &mut self.model.kept.recent;
-        recent.retain(|other| *other != path);
-        recent.insert(0, path);
-        recent.truncate(RECENT);
-    }
-
-    fn spawn(&mut self, title: String, begin: Begin) {
+    pub(super) fn spawn(&mut self, title: String, begin: Begin) -> SessionId {
         let id = SessionId(self.next_id);
         self.next_id += 1;
         self.openings.insert(id, Opening { title, activity: Activity::Opening { done: 0, of: 0 } });
-        self.model.recording = None;
-        let worker = Worker::spawn(id, begin, self.catalog.clone(), self.events.0.clone(), self.wake.clone());
+        self.close_recording();
+        self.model.browsing = false;
+        self.begun.insert(begin.path().to_owned());
+        let (events, wake) = (self.events.0.clone(), self.wake.clone());
+        let worker = Worker::spawn(id, begin, self.catalog.clone(), events, wake, &self.options.threads);
         self.workers.insert(id, worker);
+        id
     }
 
     fn start_chosen(&mut self) {
+        let against = self.model.kept.form.against;
         match self.model.kept.form.scene.clone() {
             Some(path) => {
-                if self.start(&path) {
+                if self.start(&path, against) {
                     self.remember(&path);
                 }
             }
@@ -224,15 +199,24 @@ impl App {
         }
     }
 
-    /// Starts an episode of a scene's file; false if it is none.
-    fn start(&mut self, path: &Path) -> bool {
+    /// Starts an episode of a scene's file, or two that run side by side; false if it is none.
+    pub(super) fn start(&mut self, path: &Path, against: Option<PolicyKind>) -> bool {
         match Scene::load(path, &self.catalog) {
             Ok((scene, warnings)) => {
                 for warning in warnings {
                     self.tell(Level::Warning, format!("{}: {warning}", path.display()));
                 }
                 self.model.kept.form.scene = Some(path.to_owned());
-                self.start_scene(scene);
+                let policy = self.model.kept.form.policy;
+                match against {
+                    None => {
+                        self.start_scene(scene, policy);
+                    }
+                    Some(against) => {
+                        let ids = [self.start_scene(scene.clone(), policy), self.start_scene(scene, against)];
+                        self.pairs.push(Pair { ids });
+                    }
+                }
                 true
             }
             Err(error) => {
@@ -242,10 +226,10 @@ impl App {
         }
     }
 
-    fn start_scene(&mut self, scene: Scene) {
+    fn start_scene(&mut self, scene: Scene, policy: PolicyKind) -> SessionId {
         let form = self.model.kept.form.clone();
         let config = EpisodeConfig {
-            policy: form.policy,
+            policy,
             belief: form.belief.clone(),
             seed: form.seed,
             budget: form.budget.max(1),
@@ -255,19 +239,34 @@ impl App {
         };
         let out = self.free_directory(&scene, &config);
         let title = format!("{}, {}, seed {}", scene.name, config.policy, config.seed);
-        self.spawn(title, Begin::Start { scene: Box::new(scene), config: Box::new(config), out });
+        self.spawn(title, Begin::Start { scene: Box::new(scene), config: Box::new(config), out })
+    }
+
+    /// Compares and runs two episodes that were started side by side, once both are open.
+    pub(super) fn pair_up(&mut self) {
+        let open = |model: &crate::workbench::model::Model, pair: &Pair| {
+            pair.ids.iter().all(|id| model.session_of(*id).is_some_and(|session| session.activity == Activity::Idle))
+        };
+        // One that could not be opened leaves the other alone.
+        self.pairs.retain(|pair| pair.ids.iter().all(|id| self.workers.contains_key(id)));
+        if let Some(at) = self.pairs.iter().position(|pair| open(&self.model, pair)) {
+            let [a, b] = self.pairs.remove(at).ids;
+            self.carry_out(Command::Show(a));
+            self.carry_out(Command::CompareWith(Some(b)));
+            self.run_both();
+        }
     }
 
     /// `out/<scene>-<policy>-<seed>`, with a number behind it if that is taken.
     fn free_directory(&self, scene: &Scene, config: &EpisodeConfig) -> PathBuf {
         let plain = crate::driver::default_out(scene, config.policy, config.seed);
         let name = plain.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let taken = |path: &PathBuf| path.exists() || self.model.sessions.iter().any(|session| session.path == *path);
+        let taken = |path: &PathBuf| path.exists() || self.begun.contains(path);
         let numbered = (2..).map(|n| self.options.out.join(format!("{name}-{n}")));
         std::iter::once(self.options.out.join(&name)).chain(numbered).find(|path| !taken(path)).unwrap_or(plain)
     }
 
-    fn close(&mut self, id: SessionId) {
+    pub(super) fn close(&mut self, id: SessionId) {
         if let Some(session) = self.model.session_of(id)
             && session.unsaved
             && let Err(error) = session.annotations.write(&session.path)
@@ -279,23 +278,43 @@ impl App {
         self.model.forget(id);
     }
 
-    /// Gives the shown episode's worker an order, unless it is busy.
-    fn order(&mut self, order: impl Fn(Option<&Arc<Decision>>) -> Option<Order>, activity: Activity) {
+    /// Gives the shown episode's worker an order, unless it is busy or done; says why not.
+    fn order(&mut self, order: Order, activity: Activity) {
         let Some(id) = self.model.shown else { return self.tell(Level::Warning, "Open a scene first") };
-        let Some(worker) = self.workers.get(&id) else {
-            return self.tell(Level::Warning, "This episode takes no more orders; branch from it to go on");
-        };
-        let Some(session) = self.model.session_of_mut(id) else { return };
+        match self.order_to(id, order, activity) {
+            Ok(()) => self.model.cursor = self.model.session().map_or(0, Session::steps),
+            Err((level, words)) => self.tell(level, words),
+        }
+    }
+
+    fn order_to(&mut self, id: SessionId, order: Order, activity: Activity) -> Result<(), (Level, &'static str)> {
+        let worker = self.workers.get(&id);
+        let worker = worker.ok_or((Level::Warning, "This episode takes no more orders; branch from it to go on"))?;
+        let session = self.model.session_of_mut(id).ok_or((Level::Warning, "The episode is not open"))?;
+        if session.read_only.is_some() {
+            return Err((Level::Warning, "This episode can only be looked at; branch from it to go on"));
+        }
         if session.activity != Activity::Idle {
-            return self.tell(Level::Info, "The episode is busy; cancel first");
+            return Err((Level::Info, "The episode is busy; cancel first"));
         }
         if session.is_finished() {
-            return self.tell(Level::Info, "The budget is used up; branch from an earlier step to go on");
+            return Err((Level::Info, "The budget is used up; branch from an earlier step to go on"));
         }
-        if let Some(order) = order(session.pending.as_ref()) {
-            session.activity = if matches!(order, Order::Decide) { Activity::Deciding } else { activity };
-            worker.order(order);
-            self.model.cursor = self.model.session().map_or(0, |session| session.steps());
+        session.activity = activity;
+        worker.order(order);
+        Ok(())
+    }
+
+    /// Runs both episodes of the comparison, as far as they can be.
+    fn run_both(&mut self) {
+        let ids: Vec<SessionId> = self.model.shown.into_iter().chain(self.model.other).collect();
+        let done: Vec<_> = ids.into_iter().map(|id| self.order_to(id, Order::Run, Activity::Running)).collect();
+        if done.iter().all(Result::is_err) {
+            if let Some(Err((level, words))) = done.into_iter().next() {
+                self.tell(level, words);
+            }
+        } else {
+            self.model.cursor = self.model.last_step();
         }
     }
 
@@ -314,18 +333,21 @@ impl App {
                 gains: Vec::new(),
                 candidates: Vec::new(),
                 best_push: None,
+                motion: None,
             },
         };
         self.carry_out(Command::Act(Arc::new(decision)));
     }
 
+    /// Puts the brake on what is on the window.
+    fn stop(&mut self, brake: impl Fn(&Worker)) {
+        let shown: Vec<SessionId> = self.model.on_show().map(|session| session.id).collect();
+        shown.iter().filter_map(|id| self.workers.get(id)).for_each(brake);
+    }
+
     fn cancel(&mut self) {
-        let opening: Vec<SessionId> = self.openings.keys().copied().collect();
-        for id in self.model.shown.into_iter().chain(opening) {
-            if let Some(worker) = self.workers.get(&id) {
-                worker.cancel();
-            }
-        }
+        self.stop(Worker::cancel);
+        self.openings.keys().filter_map(|id| self.workers.get(id)).for_each(Worker::cancel);
         self.model.author.cancel_generating();
     }
 
@@ -341,16 +363,12 @@ impl App {
         let Some(session) = self.model.session() else { return };
         let moment = session.moment(self.model.cursor).clone();
         let (of, setup) = ((session.id, moment.step), session.setup.clone());
-        let (answers, wake) = (self.answers.0.clone(), self.wake.clone());
-        self.jobs.add(JobKind::Preview, move || {
+        self.background.preview.ask(move |_| {
             let belief = moment.belief.belief();
             let swept = setup.tool.swept_volume(&push, &belief.grid);
             let swept = SweptPush { push, swept };
-            if let Some(prediction) = setup.update.predict_pushes(&belief, std::slice::from_ref(&swept)).pop() {
-                let (prediction, swept) = (Arc::new(prediction), Arc::new(swept.swept));
-                let _ = answers.send(Answer::Preview(Preview { of, push, prediction, swept }));
-            }
-            wake();
+            let prediction = setup.update.predict_pushes(&belief, std::slice::from_ref(&swept)).pop()?;
+            Some(Preview { of, push, prediction: Arc::new(prediction), swept: Arc::new(swept.swept) })
         });
     }
 
@@ -359,13 +377,22 @@ impl App {
         let Some(session) = self.model.session() else { return };
         let moment = session.moment(self.model.cursor).clone();
         let (of, views) = ((session.id, moment.step), session.setup.views.clone());
-        let (answers, wake) = (self.answers.0.clone(), self.wake.clone());
-        self.jobs.add(JobKind::Gain, move || {
+        self.asked_gain = Some((of, view));
+        self.background.gain.ask(move |_| {
             let field = GainField::new(&moment.belief.belief());
-            let nats = Arc::new(gain_per_voxel(&field, &views, view, RayDensity::FULL));
-            let _ = answers.send(Answer::Gain(GainSource { of, view, nats }));
-            wake();
+            let nats = gain_per_voxel(&field, &views, view, RayDensity::FULL);
+            Some(GainSource::new(of, view, nats))
         });
+    }
+
+    /// Asks again where the chosen view's gain comes from, once the cursor has moved.
+    pub(super) fn follow_gain(&mut self) {
+        let at = self.model.session().map(|session| (session.id, self.model.cursor.min(session.steps())));
+        if let (LayoutKind::Gains, Some(of), Some(view)) = (self.model.kept.layout, at, self.model.view)
+            && self.asked_gain != Some((of, view))
+        {
+            self.gain_of(view);
+        }
     }
 
     fn note(&mut self, step: usize, text: String) {
@@ -394,108 +421,6 @@ impl App {
             return self.tell(Level::Warning, "The scene has problems; mend what is red first");
         }
         let scene = self.model.author.scene().clone();
-        self.start_scene(scene);
-    }
-
-    /// Writes notes and verdicts, or the scene in the making.
-    fn save(&mut self) {
-        if self.model.kept.layout == LayoutKind::Author {
-            if self.model.author.path().is_none() {
-                return self.menu(MenuCommand::SaveSceneAs);
-            }
-            let saved = self.model.author.save();
-            return self.saved(saved.map_err(|error| error.to_string()));
-        }
-        if let Some(id) = self.model.shown {
-            let saved = self.save_notes(id);
-            self.saved(saved);
-        }
-    }
-
-    fn save_notes(&mut self, id: SessionId) -> Result<PathBuf, String> {
-        let Some(session) = self.model.session_of_mut(id) else { return Err("no episode is open".to_owned()) };
-        session.annotations.write(&session.path).map_err(|error| error.to_string())?;
-        session.unsaved = false;
-        Ok(session.path.join(crate::workbench::annotations::FILE))
-    }
-
-    fn saved(&mut self, saved: Result<PathBuf, String>) {
-        match saved {
-            Ok(path) => self.tell(Level::Info, format!("Wrote {}", path.display())),
-            Err(words) => self.tell(Level::Error, words),
-        }
-    }
-
-    /// Saves everything that is unsaved; false if something could not be.
-    fn save_all(&mut self) -> bool {
-        let unsaved: Vec<SessionId> =
-            self.model.sessions.iter().filter(|session| session.unsaved).map(|session| session.id).collect();
-        for id in unsaved {
-            if let Err(words) = self.save_notes(id) {
-                self.tell(Level::Error, words);
-                return false;
-            }
-        }
-        if self.model.author.is_unsaved() {
-            if self.model.author.path().is_none() {
-                self.menu(MenuCommand::SaveSceneAs);
-                return false;
-            }
-            if let Err(error) = self.model.author.save() {
-                self.tell(Level::Error, error.to_string());
-                return false;
-            }
-        }
-        true
-    }
-
-    /// Where something would go unless a person says otherwise.
-    fn proposal(&self, what: MenuCommand) -> PathBuf {
-        let name = self.model.session().map_or_else(
-            || "window".to_owned(),
-            |session| session.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
-        );
-        let exports = self.options.out.join("exports");
-        match what {
-            MenuCommand::ExportEpisode => exports.join(&name),
-            MenuCommand::ExportTables => exports.join(format!("{name}-tables")),
-            MenuCommand::SaveSceneAs => {
-                Path::new("scenes").join("mine").join(format!("{}.toml", self.model.author.scene().name))
-            }
-            _ => exports.join(format!("{name}-{}.png", self.model.kept.layout.title().to_lowercase())),
-        }
-    }
-
-    fn write(&mut self, what: MenuCommand, path: PathBuf) {
-        if what == MenuCommand::SaveSceneAs {
-            if let Some(folder) = path.parent() {
-                let _ = std::fs::create_dir_all(folder);
-            }
-            let saved = self.model.author.save_as(&path);
-            return self.saved(saved.map_err(|error| error.to_string()));
-        }
-        if what == MenuCommand::ExportPicture {
-            if let Some(folder) = path.parent() {
-                let _ = std::fs::create_dir_all(folder);
-            }
-            self.picture_to = Some(path);
-            self.picture_asked = true;
-            return;
-        }
-        let Some(session) = self.model.session().cloned() else { return };
-        self.tell(Level::Info, format!("Exporting to {}", path.display()));
-        self.errand(move |answers| {
-            let written = if what == MenuCommand::ExportTables {
-                export::write_tables(&session, &path).map(|_| ())
-            } else {
-                let recording = path.with_extension("rrd");
-                export::write_episode(&session, &path, &|_| true)
-                    .and_then(|()| export::write_recording(&session, &recording, &|_| true))
-            };
-            let _ = answers.send(match written {
-                Ok(()) => Answer::Tell(Level::Info, format!("Exported to {}", path.display())),
-                Err(error) => Answer::Tell(Level::Error, error.to_string()),
-            });
-        });
+        self.start_scene(scene, self.model.kept.form.policy);
     }
 }

@@ -1,11 +1,12 @@
 //! The window's frame: menus and tabs on top, the episode at the left, the clock at the bottom, and the layout's panels
 //! around the three-dimensional views.
 
-use super::App;
+use super::{App, Part};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
 use crate::workbench::panels;
+use rerun::external::re_viewer::external::re_ui::RecordingCommandKind;
 use rerun::external::{eframe, egui};
 use std::time::Instant;
 
@@ -20,9 +21,12 @@ impl App {
         egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
         let openings: Vec<_> =
             self.openings.values().map(|opening| (opening.title.clone(), opening.activity)).collect();
-        if self.model.kept.layout == LayoutKind::Author {
+        self.parts.clear();
+        if self.model.recording.is_some() {
+            self.space_view(ui, frame);
+        } else if self.model.kept.layout == LayoutKind::Author {
             egui::CentralPanel::default().show(ui, |ui| panels::author::show(ui, &mut self.model, &mut ask));
-        } else if self.model.sessions.is_empty() {
+        } else if self.model.sessions.is_empty() || self.model.browsing {
             egui::CentralPanel::default().show(ui, |ui| {
                 panels::episode::openings(ui, &openings, &mut ask);
                 panels::scenes::show(ui, &mut self.model, &mut ask);
@@ -41,6 +45,7 @@ impl App {
             self.carry_out(command);
         }
         let viewer_ms = std::mem::take(&mut self.viewer_ms);
+        self.last_viewer_ms = viewer_ms;
         if let Some(taken) = &mut self.frame_ms {
             *taken += started.elapsed().as_secs_f32() * 1e3 - viewer_ms;
         }
@@ -58,6 +63,7 @@ impl App {
         if std::mem::take(&mut self.reset_asked) {
             ctx.memory_mut(|memory| memory.reset_areas());
             ctx.data_mut(|data| data.clear());
+            self.tell_graphics(ctx);
         }
         if std::mem::take(&mut self.picture_asked) {
             ctx.send_viewport_cmd(egui::ViewportCommand::Screenshot(egui::UserData::default()));
@@ -92,10 +98,22 @@ impl App {
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 for layout in LayoutKind::ALL.into_iter().rev() {
                     let entry = MenuCommand::Layout(layout);
-                    let tab = ui.selectable_label(self.model.kept.layout == layout, layout.title());
+                    let is_shown = self.model.kept.layout == layout;
+                    let tab = ui.selectable_label(is_shown, layout.title());
+                    // A menu has the same name as one of them.
+                    tab.widget_info(|| {
+                        let name = format!("Layout {}", layout.title());
+                        egui::WidgetInfo::selected(egui::WidgetType::Button, true, is_shown, name)
+                    });
                     if tab.on_hover_text(tooltip(ui.ctx(), entry)).clicked() {
                         ask.push(Command::Layout(layout));
                     }
+                }
+                if let Some(port) = self.model.serving {
+                    ui.separator();
+                    ui.label(format!("● serving 127.0.0.1:{port}")).on_hover_text(format!(
+                        "Programs on this machine can look on: rerun --connect rerun+http://127.0.0.1:{port}/proxy"
+                    ));
                 }
             });
         });
@@ -128,42 +146,48 @@ impl App {
     fn layout(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>, ask: &mut Vec<Command>) {
         let layout = self.model.kept.layout;
         let right = match layout {
-            LayoutKind::Why | LayoutKind::Gains | LayoutKind::Push | LayoutKind::Compare => 420.0,
-            _ => 300.0,
+            LayoutKind::Gains => 460.0,
+            LayoutKind::Why | LayoutKind::Push | LayoutKind::Compare => 420.0,
+            _ => 330.0,
         };
-        egui::Panel::right(egui::Id::new(("right", layout))).default_size(right).size_range(240.0..=700.0).show(
-            ui,
-            |ui| {
-                scrolled(ui, "right", |ui| match layout {
+        let right = egui::Panel::right(egui::Id::new(("right", layout)))
+            .default_size(right)
+            .size_range(240.0..=700.0)
+            .show(ui, |ui| {
+                ui.add_space(4.0);
+                match layout {
                     LayoutKind::Why => panels::why::show(ui, &mut self.model, ask),
                     LayoutKind::Gains => panels::gains::show(ui, &mut self.model, ask),
                     LayoutKind::Push => panels::push::show(ui, &mut self.model, ask),
                     LayoutKind::Compare => panels::compare::show(ui, &mut self.model, ask),
-                    LayoutKind::Episode | LayoutKind::Author => {
+                    LayoutKind::Episode | LayoutKind::Author => scrolled(ui, "right", |ui| {
                         panels::decision::show(ui, &mut self.model, ask);
                         ui.add_space(8.0);
                         ui.separator();
                         panels::notes::show(ui, &mut self.model, ask);
-                    }
-                });
-            },
-        );
+                    }),
+                }
+            });
+        self.parts.push((Part::Right, right.response.rect));
         if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
-            egui::Panel::bottom("curves").resizable(true).default_size(170.0).size_range(110.0..=420.0).show(
-                ui,
-                |ui| {
+            let curves = egui::Panel::bottom("curves")
+                .resizable(true)
+                .default_size(190.0)
+                .size_range(130.0..=420.0)
+                .show(ui, |ui| {
                     panels::curves::show(ui, &mut self.model, ask);
-                },
-            );
+                });
+            self.parts.push((Part::Curves, curves.response.rect));
         }
         if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {
-            egui::Panel::right("maps").default_size(390.0).size_range(220.0..=800.0).show(ui, |ui| {
+            let maps = egui::Panel::right("maps").default_size(340.0).size_range(220.0..=800.0).show(ui, |ui| {
                 scrolled(ui, "maps", |ui| {
                     panels::maps::show(ui, &mut self.model, ask);
                     ui.add_space(6.0);
                     panels::camera::show(ui, &mut self.model, ask);
                 });
             });
+            self.parts.push((Part::Maps, maps.response.rect));
         }
         egui::Panel::bottom("display").show(ui, |ui| {
             panels::display::show(ui, &mut self.model, self.drawn.count(crate::workbench::space::at::BELIEF), ask);
@@ -174,6 +198,7 @@ impl App {
     /// The three-dimensional views, or why there are none.
     fn space_view(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
         let started = Instant::now();
+        self.parts.push((Part::Space, ui.available_rect_before_wrap()));
         match (&mut self.viewer, frame) {
             (Some(viewer), Some(frame)) => viewer.ui(ui, frame),
             _ => {
@@ -208,6 +233,7 @@ impl App {
         {
             self.reply(reply);
         }
+        panels::windows::tasks(ctx, self.tasks.under_way(), ask);
         panels::windows::toasts(ctx, &mut self.model.toasts, ask);
         if self.model.recording.is_some() {
             egui::Area::new(egui::Id::new("recording")).anchor(egui::Align2::CENTER_TOP, [0.0, 34.0]).show(ctx, |ui| {
@@ -215,13 +241,35 @@ impl App {
                     ui.horizontal(|ui| {
                         let name = self.model.recording.as_ref().map(|path| path.display().to_string());
                         ui.label(format!("Recording {}", name.unwrap_or_default()));
-                        if ui.button("Back to the episode").clicked() {
+                        let steps = [
+                            ("⏮", "Beginning of the recording", RecordingCommandKind::PlaybackBeginning),
+                            ("⏴", "A step back in the recording", RecordingCommandKind::PlaybackStepBack),
+                            ("⏯", "Play or pause the recording", RecordingCommandKind::PlaybackTogglePlayPause),
+                            ("⏵", "A step on in the recording", RecordingCommandKind::PlaybackStepForward),
+                            ("⏭", "End of the recording", RecordingCommandKind::PlaybackEndAndFollow),
+                        ];
+                        for (icon, words, kind) in steps {
+                            let button = ui.button(icon);
+                            button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, words));
+                            if let Some(viewer) = self.viewer.as_mut().filter(|_| button.on_hover_text(words).clicked())
+                            {
+                                viewer.play(kind);
+                            }
+                        }
+                        let back = if self.model.sessions.is_empty() { "Close" } else { "Back to the episode" };
+                        if ui.button(back).on_hover_text("The recording's file stays as it is").clicked() {
                             ask.push(Command::CloseRecording);
                         }
                     });
                 });
             });
         }
+    }
+
+    /// Keeps the name of the graphics driver where the box about versions finds it.
+    pub(super) fn tell_graphics(&self, ctx: &egui::Context) {
+        let name = self.graphics.clone();
+        ctx.data_mut(|data| data.insert_temp(panels::windows::graphics_id(), name));
     }
 
     /// Adds a message.

@@ -1,10 +1,10 @@
 //! What comes in every frame: events of workers, answers of jobs, clicks in the viewer, keys, dropped files.
 
-use super::{Answer, App, ChosenFor};
+use super::{App, ChosenFor, Part};
 use crate::workbench::annotations::Annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::derive::Derived;
-use crate::workbench::jobs::JobKind;
+use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, Picked};
 use crate::workbench::session::{Activity, Session, SessionId};
 use crate::workbench::space::{Side, Space};
@@ -13,6 +13,8 @@ use crate::workbench::worker::{Event, Opened};
 use rerun::external::egui;
 use std::sync::{Arc, PoisonError};
 
+/// Frames after everything is done before a script's picture is taken, so that what was logged is drawn.
+const CALM_FRAMES: usize = 20;
 /// How many states keep their maps and full beliefs.
 const DERIVED_KEPT: usize = 6;
 
@@ -21,15 +23,15 @@ impl App {
         while let Ok((id, event)) = self.events.1.try_recv() {
             self.hear(id, event);
         }
-        while let Ok(answer) = self.answers.1.try_recv() {
-            self.receive(answer);
-        }
+        self.answers();
         if let Some(clicked) = self.viewer.as_mut().and_then(|viewer| viewer.clicked()) {
             self.click(&clicked);
         }
         self.keys(ctx);
         self.dropped(ctx);
         self.picture(ctx);
+        self.pair_up();
+        self.follow_gain();
         self.derive();
         self.space();
         self.quitting(ctx);
@@ -38,7 +40,9 @@ impl App {
 
     fn hear(&mut self, id: SessionId, event: Event) {
         match event {
-            Event::Opened(opened) => self.opened(id, *opened),
+            // One that was closed meanwhile has no worker any more.
+            Event::Opened(opened) if self.workers.contains_key(&id) => self.opened(id, *opened),
+            Event::Opened(_) => {}
             Event::Activity(activity) => {
                 if let Some(opening) = self.openings.get_mut(&id) {
                     opening.activity = activity;
@@ -52,16 +56,16 @@ impl App {
                 }
             }
             Event::Stepped(moment) => {
-                let (shown, cursor) = (self.model.shown, self.model.cursor);
+                // Who looks at the latest state goes on looking at the latest.
+                let followed = self.model.cursor >= self.model.last_step();
                 let Some(session) = self.model.session_of_mut(id) else { return };
-                let followed = shown == Some(id) && cursor >= session.steps();
                 if let Some(outcome) = &moment.outcome {
                     session.record.steps.push(outcome.record.clone());
                 }
                 session.moments.push(moment);
                 session.pending = None;
                 if followed {
-                    self.model.cursor = cursor + 1;
+                    self.model.cursor = self.model.last_step();
                 }
             }
             Event::Failed(words) => {
@@ -79,13 +83,8 @@ impl App {
                 if let Some(session) = self.model.session_of_mut(id) {
                     session.activity = Activity::Idle;
                     session.read_only = Some("its worker broke down".to_owned());
-                    let path = session.path.display().to_string();
-                    let steps = session.steps();
-                    let message = format!(
-                        "The episode's worker broke down: {words}. All {steps} steps are saved in {path}; export it, or \
-                         close and open it to go on."
-                    );
-                    self.model.toasts.tell(Level::Error, message);
+                    let (path, steps) = (session.path.clone(), session.steps());
+                    self.dialog = Some(Dialog::Broke { id, words, path, steps });
                 } else {
                     self.model.toasts.tell(Level::Error, format!("The episode could not be opened: {words}"));
                 }
@@ -125,25 +124,39 @@ impl App {
         self.model.cursor = steps;
     }
 
-    fn receive(&mut self, answer: Answer) {
-        match answer {
-            Answer::Maps(derived) => {
-                self.model.derived.insert(derived.of, Arc::new(derived));
-            }
-            Answer::Preview(preview) => self.model.preview = Some(preview),
-            Answer::Gain(source) => self.model.gain_source = Some(source),
-            Answer::Tell(level, text) => self.model.toasts.tell(level, text),
-            Answer::Chosen(ChosenFor::Opening, path) => self.carry_out(Command::Open(path)),
-            Answer::Chosen(ChosenFor::Dialog, path) => {
-                if let Some(dialog) = &mut self.dialog {
-                    dialog.chosen(&path);
-                }
+    /// What was made in the background, what tasks have to say, and what was chosen in the system's dialogs.
+    fn answers(&mut self) {
+        let background = &self.background;
+        for (_, derived) in background.maps.take().into_iter().chain(background.other_maps.take()) {
+            self.model.derived.insert(derived.of, Arc::new(derived));
+        }
+        if let Some((_, preview)) = background.preview.take() {
+            self.model.preview = Some(preview);
+        }
+        if let Some((_, source)) = background.gain.take() {
+            self.model.gain_source = Some(source);
+        }
+        for words in background.broke() {
+            self.model.toasts.tell(Level::Error, format!("A background job broke down: {words}"));
+        }
+        for (level, words) in self.tasks.ended() {
+            self.model.toasts.tell(level, words);
+        }
+        while let Ok((purpose, path)) = self.chosen.1.try_recv() {
+            match (purpose, &mut self.dialog) {
+                (ChosenFor::Opening, _) => self.carry_out(Command::Open(path)),
+                (ChosenFor::Dialog, Some(dialog)) => dialog.chosen(&path),
+                (ChosenFor::Dialog, None) => {}
             }
         }
     }
 
     /// A click in three dimensions asks about the voxel.
     fn click(&mut self, clicked: &Clicked) {
+        if self.model.recording.is_some() {
+            // Of a foreign recording nothing is known but what the viewer shows.
+            return;
+        }
         let voxel = clicked.instance.and_then(|instance| self.drawn.voxel(&clicked.entity, instance));
         if let Some(voxel) = voxel {
             self.carry_out(Command::Pick(Some(Picked::Voxel(voxel))));
@@ -153,15 +166,22 @@ impl App {
             self.carry_out(Command::GainOf(nudge_core::camera::ViewId(view as u16)));
         } else if clicked.entity == crate::workbench::space::at::CANDIDATES {
             self.model.candidate = clicked.instance;
+            let decision = self.model.session().and_then(|session| session.decision_after(self.model.cursor));
+            let candidate = clicked.instance.and_then(|at| decision?.candidates.get(at));
+            if let Some(push) = candidate.map(|candidate| candidate.push) {
+                self.carry_out(Command::Preview(push));
+            }
         }
     }
 
     /// Shortcuts are taken before the viewer sees them; a text field keeps its keys.
     fn keys(&mut self, ctx: &egui::Context) {
-        let typing = ctx.egui_wants_keyboard_input();
+        let (typing, focused) = (ctx.text_edit_focused(), ctx.memory(|memory| memory.focused().is_some()));
         let authoring = self.model.kept.layout == LayoutKind::Author;
-        for entry in MenuCommand::all() {
-            let Some(keys) = entry.shortcut() else { continue };
+        // The longer ones first: a shortcut also answers to more modifiers than its own.
+        let mut entries: Vec<_> = MenuCommand::all().filter_map(|entry| Some((entry, entry.shortcut()?))).collect();
+        entries.sort_by_key(|(_, keys)| !keys.modifiers.shift);
+        for (entry, keys) in entries {
             let plain = keys.modifiers.is_none();
             // Undo and the keys without a modifier belong to whatever is typed in, and the editor has its own.
             let edits =
@@ -169,11 +189,19 @@ impl App {
             if (plain && (typing || self.dialog.is_some())) || (edits && (typing || authoring)) {
                 continue;
             }
-            if plain && entry != MenuCommand::Cancel && authoring {
+            if plain && entry != MenuCommand::Cancel && entry != MenuCommand::Shortcuts && authoring {
                 continue;
             }
-            if ctx.input_mut(|input| input.consume_shortcut(&keys)) && entry.is_available(&self.model) {
-                self.carry_out(Command::Menu(entry));
+            // Enter presses the button that has the focus.
+            if keys.logical_key == egui::Key::Enter && focused {
+                continue;
+            }
+            let back = entry == MenuCommand::Cancel && self.model.browsing && !self.model.sessions.is_empty();
+            let available = back || entry.is_available(&self.model);
+            // The viewer has meanings of its own for some of them.
+            let taken = (available || !plain) && ctx.input_mut(|input| input.consume_shortcut(&keys));
+            if taken && available {
+                self.carry_out(if back { Command::Browse(false) } else { Command::Menu(entry) });
             }
         }
     }
@@ -193,41 +221,27 @@ impl App {
                 _ => None,
             })
         });
-        let (Some(image), Some(path)) = (taken, self.picture_to.take()) else { return };
-        self.errand(move |answers| {
-            let rgb = image.pixels.iter().flat_map(|pixel| [pixel.r(), pixel.g(), pixel.b()]).collect();
-            let picture = image::RgbImage::from_raw(image.width() as u32, image.height() as u32, rgb);
-            let written = picture
-                .ok_or_else(|| "the picture is empty".to_owned())
-                .and_then(|picture| crate::picture::save(&picture, &path).map_err(|error| error.to_string()));
-            let _ = answers.send(match written {
-                Ok(()) => Answer::Tell(Level::Info, format!("Wrote {}", path.display())),
-                Err(words) => Answer::Tell(Level::Error, words),
-            });
-        });
+        if let (Some(image), true) = (taken, self.picture_to.is_some())
+            && let Some((part, path)) = self.picture_to.take()
+        {
+            self.write_picture(image, part, path, ctx.pixels_per_point());
+        }
     }
 
     /// Asks for the maps of the states that are shown.
     fn derive(&mut self) {
-        let shown = self.model.session().map(|session| (session.id, JobKind::Maps));
-        let other = self
+        let wanted: Vec<_> = self
             .model
-            .other_session()
-            .filter(|_| self.model.kept.layout == LayoutKind::Compare)
-            .map(|session| (session.id, JobKind::OtherMaps));
-        for (id, kind) in shown.into_iter().chain(other) {
-            let Some(session) = self.model.session_of(id) else { continue };
-            let moment = session.moment(self.model.cursor).clone();
+            .on_show()
+            .map(|session| (session.id, session.moment(self.model.cursor).clone(), session.setup.catalog.clone()))
+            .collect();
+        for ((id, moment, catalog), other) in wanted.into_iter().zip([false, true]) {
             let key = (id, moment.step);
-            let catalog = session.setup.catalog.clone();
             if self.model.derived.contains_key(&key) || !self.model.deriving.insert(key) {
                 continue;
             }
-            let (answers, wake) = (self.answers.0.clone(), self.wake.clone());
-            self.jobs.add(kind, move || {
-                let _ = answers.send(Answer::Maps(Derived::of(id, &moment, &catalog)));
-                wake();
-            });
+            let maps = if other { &mut self.background.other_maps } else { &mut self.background.maps };
+            maps.ask(move |_| Some(Derived::of(id, &moment, &catalog)));
         }
         // A request that was replaced while it waited must be made again when its state is shown again.
         let wanted: Vec<_> = [self.model.shown, self.model.other]
@@ -245,6 +259,9 @@ impl App {
     /// Asks for the three-dimensional views, if something about them has changed.
     fn space(&mut self) {
         let Some(painter) = &self.painter else { return };
+        // Where the views are is known once they were drawn.
+        let place = self.parts.iter().find(|(part, _)| *part == Part::Space).map(|(_, rect)| rect.aspect_ratio());
+        let Some(aspect) = place.filter(|aspect| aspect.is_finite()) else { return };
         let model = &self.model;
         let side = |session: &Session| {
             let moment = session.moment(model.cursor).clone();
@@ -261,8 +278,9 @@ impl App {
         };
         let kept = &model.kept;
         let key = format!(
-            "{:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            "{:?} {aspect:.2} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             kept.layout,
+            kept.light,
             model.session().map(|session| (session.id, session.steps(), session.pending.is_some())),
             model.other_session().map(|session| (session.id, session.steps())),
             model.cursor,
@@ -280,6 +298,8 @@ impl App {
         self.asked_space = key;
         let space = Space {
             layout: kept.layout,
+            aspect,
+            light: kept.light,
             side: model.session().map(side),
             other: model.other_session().filter(|_| kept.layout == LayoutKind::Compare).map(side),
             display: kept.display.clone(),
@@ -290,10 +310,10 @@ impl App {
             preview: model.preview.clone(),
             gain: model.gain_source.clone(),
         };
-        let (painter, wake) = (painter.clone(), self.wake.clone());
-        self.jobs.add(JobKind::Space, move || {
+        let painter = painter.clone();
+        self.background.space.ask(move |_| {
             painter.lock().unwrap_or_else(PoisonError::into_inner).paint(&space);
-            wake();
+            Some(())
         });
     }
 
@@ -312,8 +332,8 @@ impl App {
         }
         self.script_frames += 1;
         match self.script_frames {
-            40 => (self.picture_to, self.picture_asked) = (Some(script.picture), true),
-            41.. if self.picture_to.is_none() && self.jobs.is_idle() => {
+            CALM_FRAMES => (self.picture_to, self.picture_asked) = (Some((Part::Window, script.picture)), true),
+            frames if frames > CALM_FRAMES && self.picture_to.is_none() => {
                 (self.may_quit, self.quit_asked) = (true, true);
             }
             _ => {}
@@ -327,7 +347,7 @@ impl App {
         let lost = self.unsaved();
         if !lost.is_empty() {
             ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
-            self.dialog = Some(crate::workbench::dialog::Dialog::Quit { lost });
+            self.dialog = Some(Dialog::Quit { lost });
         }
     }
 }

@@ -73,7 +73,7 @@ impl Plan {
         let turned = outline::placed(footprint, [0.0, 0.0], yaw_deg);
         let reach = radius(&turned, [0.0, 0.0]);
         let (min, max) = (scene.shelf.min(), scene.shelf.max());
-        let others: Vec<([f32; 2], f32, &Vec<[f32; 2]>)> = self
+        let others: Vec<_> = self
             .outlines
             .iter()
             .zip(&scene.objects)

@@ -2,8 +2,7 @@ use super::*;
 use std::sync::mpsc::channel;
 
 fn with(classes: &[(&str, [f32; 2])]) -> Author {
-    let mut author = Author::default();
-    author.snap = Snap::Off;
+    let mut author = Author { snap: Snap::Off, ..Author::default() };
     for (class, position) in classes {
         author.add_at(class, *position);
     }
@@ -142,7 +141,7 @@ fn fields_that_change_many_times_are_one_step() {
 fn hidden_objects_are_counted_for_the_latest_scene() {
     let (woken, wakes) = channel();
     let mut author = with(&[("pasta_box", [0.0, 0.1])]);
-    author.wake_with(Arc::new(move || drop(woken.send(()))));
+    author.wake_with(Arc::new(move || woken.send(()).unwrap_or_default()));
     author.add_at("gelatin_box", [0.0, 0.18]);
     while author.hidden().is_stale || author.hidden().objects.is_none() {
         wakes.recv_timeout(std::time::Duration::from_secs(120)).expect("counted");
@@ -155,7 +154,7 @@ fn hidden_objects_are_counted_for_the_latest_scene() {
 fn generating_keeps_what_stands_and_is_one_step() {
     let (woken, wakes) = channel();
     let mut author = with(&[("pasta_box", [0.0, 0.1])]);
-    author.wake_with(Arc::new(move || drop(woken.send(()))));
+    author.wake_with(Arc::new(move || woken.send(()).unwrap_or_default()));
     author.fill = FillForm { fill: 0.25, rho: 0.0, seed: 4 };
     author.generate();
     let added = loop {

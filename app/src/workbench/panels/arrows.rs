@@ -73,7 +73,11 @@ fn head(tip: Pos2, way: Vec2, length: f32, colour: Color32, stroke: Stroke) -> S
 /// A word beside an arrow's tip.
 pub fn tag(ui: &Ui, painter: &Painter, at: Pos2, text: &str) {
     let galley = painter.layout_no_wrap(text.to_owned(), legend::small(ui), Color32::WHITE);
-    let place = at + Vec2::new(6.0, -0.5 * galley.size().y);
+    let mut place = at + Vec2::new(6.0, -0.5 * galley.size().y);
+    // At the map's edge on the other side.
+    if place.x + galley.size().x + 3.0 > painter.clip_rect().right() {
+        place.x = at.x - 6.0 - galley.size().x;
+    }
     let ground = egui::Rect::from_min_size(place, galley.size()).expand2(Vec2::new(3.0, 1.0));
     painter.rect_filled(ground, 3.0, Color32::from_black_alpha(190));
     painter.galley(place, galley, Color32::WHITE);

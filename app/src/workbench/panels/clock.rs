@@ -16,7 +16,8 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
         ];
         for (entry, icon) in buttons {
             let button = ui.add_enabled(entry.is_available(model), egui::Button::new(icon));
-            button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, entry.title()));
+            let enabled = entry.is_available(model);
+            button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, enabled, entry.title()));
             if button.on_hover_text(entry.tooltip()).clicked() {
                 ask.push(Command::Menu(entry));
             }
@@ -44,13 +45,20 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
             ui.separator();
             ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
                 egui::ScrollArea::horizontal().id_salt("steps").show(ui, |ui| {
-                    for moment in &session.moments {
-                        let step = moment.step;
+                    let last = model.last_step();
+                    let other = model.on_show().nth(1);
+                    let parting = other.and_then(|other| super::compare::first_difference(session, other));
+                    for step in 0..=last {
+                        // In a comparison the longer episode goes on.
+                        let mut moments = model.on_show().filter_map(|session| session.moments.get(step));
+                        let Some(moment) = moments.next() else { break };
                         let pushed = matches!(
                             moment.outcome.as_ref().map(|outcome| outcome.record.action),
                             Some(Action::Push(_))
                         );
-                        let text = if pushed { format!("▲{step}") } else { step.to_string() };
+                        // The first step at which the two of a comparison differ.
+                        let parts = if parting == Some(step) { "≠" } else { "" };
+                        let text = if pushed { format!("▲{parts}{step}") } else { format!("{parts}{step}") };
                         let words = match &moment.outcome {
                             None => "Before the first action".to_owned(),
                             Some(outcome) => crate::record::decision::line(&outcome.record),
@@ -67,7 +75,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
                             ask.push(Command::GoTo(step));
                         }
                     }
-                    for step in session.moments.len()..=session.record.config.budget {
+                    for step in last + 1..=session.record.config.budget {
                         ui.add_enabled(
                             false,
                             egui::Label::new(egui::RichText::new(step.to_string()).monospace().weak()),

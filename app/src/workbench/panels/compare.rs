@@ -7,7 +7,7 @@ use super::{NO_EPISODE, empty, heading, maps, words};
 use crate::colors::{self, Colormap};
 use crate::picture::{self, FloorPlan};
 use crate::record::decision::SERIES;
-use crate::workbench::command::Command;
+use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::derive::{Derived, MapKind};
 use crate::workbench::model::{Model, Picked};
 use crate::workbench::session::{Session, SessionId};
@@ -70,6 +70,15 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) {
         };
         return empty(ui, text);
     };
+    let run = MenuCommand::RunBoth;
+    let button = ui.add_enabled(run.is_available(model), egui::Button::new(run.title()));
+    if button
+        .on_hover_text(run.tooltip())
+        .on_disabled_hover_text("Both are busy or have used up their budgets")
+        .clicked()
+    {
+        ask.push(Command::Menu(run));
+    }
     egui::ScrollArea::vertical().id_salt("compare").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 4.0;
         parting(ui, model, a, b, ask);
@@ -285,7 +294,7 @@ fn show_floor(
     let map = FloorMap { grid, picture, outlines, picked, apron_m: 0.0, name: &name };
     let drawn = map.show(ui, ui.available_width());
     drawn.tell(tell);
-    if let Some(cell) = drawn.over.filter(|_| drawn.response.clicked()) {
+    if let Some(cell) = drawn.chosen {
         ask.push(Command::Pick(Some(Picked::Cell(cell))));
     }
 }

@@ -8,9 +8,7 @@ use crate::workbench::model::{LayoutKind, Model};
 use crate::workbench::session::Session;
 use egui_plot::{AxisHints, GridMark, Line, LineStyle, MarkerShape, Plot, PlotPoint, Points, VLine};
 use nudge_core::plan::Action;
-use rerun::external::egui::{
-    Color32, CursorIcon, Rangef, RichText, Sense, Stroke, TextStyle, Ui, WidgetInfo, WidgetType, vec2,
-};
+use rerun::external::egui::{Color32, CursorIcon, Rangef, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
 
 /// The scores between 0 and 1 that are drawn.
 const SHARES: [&str; 3] = ["occupancy_iou", "occupied_iou", "semantic_miou"];
@@ -25,24 +23,27 @@ pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     let shares: Vec<&Series> =
         SHARES.iter().filter_map(|key| SERIES.iter().find(|series| series.key == *key)).collect();
     let entropy: Vec<&Series> = SERIES.iter().filter(|series| series.key == ENTROPY).collect();
-    let (gap, height) = (12.0, ui.available_height().max(90.0));
+    let gap = 12.0;
+    ui.set_min_height(ui.available_height());
+    // Measured from the panel's own edge: what is drawn must never be taller than the panel, or the panel would grow with
+    // every frame.
+    let (top, bottom) = (ui.cursor().top(), ui.max_rect().bottom());
     if ui.available_width() >= 560.0 {
         let left = (0.6 * (ui.available_width() - gap)).floor();
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = gap;
             ui.vertical(|ui| {
                 ui.set_width(left);
-                curves.plot(ui, "Scores", &shares, [0.0, 1.0], height, ask);
+                curves.plot(ui, "Scores", &shares, [0.0, 1.0], bottom, ask);
             });
             ui.vertical(|ui| {
                 ui.set_width(ui.available_width());
-                curves.plot(ui, "Entropy", &entropy, curves.entropy_range(), height, ask);
+                curves.plot(ui, "Entropy", &entropy, curves.entropy_range(), bottom, ask);
             });
         });
     } else {
-        let each = (0.5 * (height - gap)).max(80.0);
-        curves.plot(ui, "Scores", &shares, [0.0, 1.0], each, ask);
-        curves.plot(ui, "Entropy", &entropy, curves.entropy_range(), each, ask);
+        curves.plot(ui, "Scores", &shares, [0.0, 1.0], 0.5 * (top + bottom), ask);
+        curves.plot(ui, "Entropy", &entropy, curves.entropy_range(), bottom, ask);
     }
     // A drag that stays within a step asks for nothing new.
     let cursor = model.cursor;
@@ -77,9 +78,10 @@ impl Curves<'_> {
         sessions.map(|session| session.record.config.budget.max(session.steps())).max().unwrap_or(1).max(1)
     }
 
-    fn plot(&self, ui: &mut Ui, name: &str, series: &[&Series], range: [f64; 2], height: f32, ask: &mut Vec<Command>) {
+    /// A plot with its legend above, down to the height `bottom` on the screen.
+    fn plot(&self, ui: &mut Ui, name: &str, series: &[&Series], range: [f64; 2], bottom: f32, ask: &mut Vec<Command>) {
         self.legend(ui, series);
-        let height = (height - ui.text_style_height(&TextStyle::Small) - 8.0).max(60.0);
+        let height = (bottom - ui.cursor().top() - ui.spacing().item_spacing.y - 1.0).max(60.0);
         let (budget, last) = (self.budget(), self.session.steps());
         let margin = 0.025 * budget as f64;
         let font = legend::small(ui);
@@ -104,6 +106,7 @@ impl Curves<'_> {
             .custom_x_axes(vec![x_axis])
             .custom_y_axes(vec![y_axis])
             .x_grid_spacer(move |input| steps(input.bounds, every))
+            .y_grid_spacer(move |_| marks(range))
             .allow_zoom(false)
             .allow_drag(false)
             .allow_scroll(false)
@@ -147,8 +150,8 @@ impl Curves<'_> {
         let at = |session: &Session, series: &Series| {
             words::significant((series.value)(&session.moment(self.cursor).scores), 3)
         };
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 5.0;
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing = vec2(5.0, 1.0);
             for series in series {
                 let (rect, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
                 let ink = legend::line_ink(ui, series.rgb);
@@ -161,7 +164,7 @@ impl Curves<'_> {
                 ui.label(words::figure(value).strong());
                 ui.add_space(6.0);
             }
-            if self.other.is_some() {
+            if self.other.is_some() && series.len() > 1 {
                 ui.label(RichText::new("A solid, B dashed, dotted: first difference").small().weak());
             } else if !self.pushes([0.0, 1.0]).is_empty() {
                 ui.label(RichText::new("triangle: push").small().weak());
@@ -207,6 +210,15 @@ fn tick(value: f64, largest: f64) -> String {
         l if l >= 5_000.0 => format!("{:.0}k", value / 1e3),
         _ => format!("{value:.0}"),
     }
+}
+
+/// About five marks from 0 up, at round numbers.
+fn marks([_, high]: [f64; 2]) -> Vec<GridMark> {
+    let rough = high / 5.0;
+    let power = 10.0_f64.powf(rough.log10().floor());
+    let step_size = [1.0, 2.0, 5.0, 10.0].map(|n| n * power).into_iter().find(|step| *step >= 0.999 * rough);
+    let step_size = step_size.unwrap_or(high);
+    (0..=(high / step_size + 1e-6) as usize).map(|n| GridMark { value: n as f64 * step_size, step_size }).collect()
 }
 
 /// Marks at whole steps.

@@ -41,29 +41,39 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         return touched;
     };
     let Some(decision) = session.decision_after(model.cursor) else {
-        nothing(ui, session);
+        nothing(ui, session, "what the policy would do", ask);
         return touched;
     };
     let gamma = session.record.config.planner.gamma;
-    egui::ScrollArea::vertical().id_salt("decision").auto_shrink(false).show(ui, |ui| {
-        ui.spacing_mut().item_spacing.y = 4.0;
-        header(ui, session, model.cursor);
-        verdict(ui, decision, gamma);
-        ui.add_space(4.0);
-        views(state, ui, model, session, decision, &mut touched, ask);
-        ui.add_space(4.0);
-        pushes(state, ui, model, session, decision, &mut touched, ask);
-    });
+    ui.spacing_mut().item_spacing.y = 4.0;
+    header(ui, session, model.cursor);
+    verdict(ui, decision, gamma);
+    ui.add_space(4.0);
+    views(state, ui, model, session, decision, &mut touched, ask);
+    ui.add_space(4.0);
+    pushes(state, ui, model, session, decision, &mut touched, ask);
     touched
 }
 
-fn nothing(ui: &mut Ui, session: &Session) {
-    let text = match session.activity {
-        Activity::Deciding | Activity::Running => "Weighing views and pushes",
-        _ if session.is_finished() => "The budget is used up: step back to see what was weighed",
-        _ => "Nothing weighed yet: decide, to see what the policy would do",
+/// Says why nothing is weighed at the cursor, and offers the way to `what`.
+pub fn nothing(ui: &mut Ui, session: &Session, what: &str, ask: &mut Vec<Command>) {
+    if matches!(session.activity, Activity::Deciding | Activity::Running) {
+        return empty(ui, "Weighing views and pushes");
+    }
+    let (text, title, command) = if session.is_finished() && session.steps() > 0 {
+        ("The budget is used up".to_owned(), "See the last decision", Command::GoTo(session.steps() - 1))
+    } else {
+        (format!("Nothing weighed yet: decide, to see {what}"), "Decide now", Command::Decide)
     };
-    empty(ui, text);
+    empty(ui, &text);
+    ui.vertical_centered(|ui| {
+        super::framed(ui);
+        let possible = session.is_open() || session.is_finished();
+        if ui.add_enabled(possible, Button::new(title)).on_hover_text("Shows what was weighed").clicked() {
+            ask.push(command);
+        }
+    });
+    ui.add_space(8.0);
 }
 
 /// Which step it is and whether it is done.
@@ -116,7 +126,7 @@ fn because(reason: Reason) -> String {
     match reason {
         Reason::LookTellsMore | Reason::PushTellsMore | Reason::MapComplete => words::reason(reason).to_owned(),
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
-        Reason::TooEarly => "nothing is pushed in the first three steps".to_owned(),
+        Reason::TooEarly => "nothing is pushed in the first steps".to_owned(),
         Reason::LastStep => "nothing is pushed in the last step".to_owned(),
         Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
         Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),
@@ -212,7 +222,7 @@ pub fn push_table(
 }
 
 /// What pointing at or clicking a push leads to.
-pub fn apply_push(table: table::Touched, decision: &Decision, touched: &mut Touched, ask: &mut Vec<Command>) {
+pub(super) fn apply_push(table: table::Touched, decision: &Decision, touched: &mut Touched, ask: &mut Vec<Command>) {
     let push = |at: usize| decision.candidates.get(at).map(|candidate| candidate.push);
     if let Some(push) = table.over.and_then(push) {
         touched.over = Some(Hovered::Push(push));
@@ -249,7 +259,12 @@ fn do_instead(ui: &mut Ui, session: &Session, cursor: usize, name: &str, title: 
         session if session.activity != Activity::Idle => Some("Busy: wait, or cancel"),
         _ => None,
     });
-    let button = ui.add_enabled(hindrance.is_none(), Button::new(title).small());
+    let button = ui
+        .scope(|ui| {
+            super::framed(ui);
+            ui.add_enabled(hindrance.is_none(), Button::new(title))
+        })
+        .inner;
     button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, hindrance.is_none(), name));
     let button = button.on_hover_text("Does this in place of what the policy would do");
     button.on_disabled_hover_text(hindrance.unwrap_or_default()).clicked()

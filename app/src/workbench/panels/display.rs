@@ -1,6 +1,6 @@
 //! How the belief is drawn in three dimensions: what colour says, which voxels, and the legend.
 
-use super::legend;
+use super::{legend, words};
 use crate::colors::{self, Colormap, Rgb};
 use crate::workbench::command::Command;
 use crate::workbench::model::{ColourBy, LayoutKind, Model};
@@ -10,13 +10,21 @@ use rerun::external::egui;
 pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<Command>) {
     let ceiling = model.session().map_or(0.40, |session| session.record.scene.shelf.size[2]);
     let layout = model.kept.layout;
+    let most = model
+        .gain_source
+        .as_ref()
+        .map_or("most".to_owned(), |source| format!("{} and more", words::significant(f64::from(source.top), 2)));
     let display = &mut model.kept.display;
+    if layout == LayoutKind::Gains {
+        ui.horizontal(|ui| {
+            ui.label("gain per voxel");
+            scale(ui, Colormap::Cividis, "gain", ["0", &most], "nats");
+        });
+        return;
+    }
     ui.horizontal_wrapped(|ui| {
-        if layout == LayoutKind::Gains {
-            ui.label("gain per voxel, nats");
-            scale(ui, Colormap::Cividis, "gain", ["0", "most"], "nats");
-            return;
-        }
+        ui.spacing_mut().item_spacing.x = 6.0;
+        ui.spacing_mut().interact_size.x = 30.0;
         ui.label("colour by");
         let combo = egui::ComboBox::from_id_salt("colour by").width(96.0).selected_text(display.colour_by.title());
         let shown = combo.show_ui(ui, |ui| {
@@ -33,20 +41,34 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         }
         ui.label("height");
         range(ui, &mut display.clip_m, 0.0..=ceiling, 0.005, " m", "height above the board");
+    });
+    ui.horizontal_wrapped(|ui| {
         ui.checkbox(&mut display.truth, "truth").on_hover_text("The true objects as glass");
         ui.checkbox(&mut display.views, "views").on_hover_text("The candidate views as frusta, coloured by gain");
         ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
         ui.separator();
         key(ui, display.colour_by);
+        // The views beside it that show a difference have a scale of their own.
+        if matches!(layout, LayoutKind::Compare | LayoutKind::Push) {
+            let (name, unit) = if layout == LayoutKind::Push {
+                ("predicted minus now", "difference")
+            } else {
+                ("A minus B", "A − B")
+            };
+            scale(ui, Colormap::Diverging, name, ["−1", "+1"], unit);
+        }
         ui.weak(format!("{drawn} voxels")).on_hover_text("Drawn; only the surface of what is inside the band shows");
     });
 }
 
+/// Width of a colour scale, points.
+const WIDTH: f32 = 150.0;
+
 /// A colour scale of a fixed width.
 fn scale(ui: &mut egui::Ui, map: Colormap, name: &str, ends: [&str; 2], unit: &str) {
     ui.scope(|ui| {
-        ui.set_max_width(180.0);
-        ui.vertical(|ui| {
+        ui.set_max_width(WIDTH);
+        ui.allocate_ui(egui::vec2(WIDTH, 20.0), |ui| {
             let texts = legend::Bar { name, ends: ends.map(str::to_owned), unit, hint: "" };
             legend::bar(ui, &texts, move |t| map.rgb(t));
         });

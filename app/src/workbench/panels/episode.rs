@@ -1,10 +1,19 @@
 //! The episode at the left: its scene, how it is run, what can be done next, and the other open episodes.
 
+use crate::driver::{BELIEFS, belief_update};
 use crate::workbench::command::{Command, MenuCommand};
-use crate::workbench::model::Model;
+use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session};
-use nudge_core::plan::PolicyKind;
+use nudge_core::plan::{PlannerSettings, PolicyKind};
 use rerun::external::egui;
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+/// Why belief updates are not there, by name; looked up once, since networks are read for it.
+static MISSING: LazyLock<BTreeMap<&str, String>> = LazyLock::new(|| {
+    let reason = |name| belief_update(Some(name), PolicyKind::Mem).err().map(|error| error.to_string());
+    BELIEFS.into_iter().filter_map(|name| Some((name, reason(name)?))).collect()
+});
 
 /// Draws the episodes that are being opened, each with its progress.
 pub fn openings(ui: &mut egui::Ui, openings: &[(String, Activity)], ask: &mut Vec<Command>) {
@@ -18,7 +27,7 @@ pub fn openings(ui: &mut egui::Ui, openings: &[(String, Activity)], ask: &mut Ve
                 ui.add(egui::Spinner::new());
             }
         }
-        if ui.button("Cancel opening").clicked() {
+        if ui.button("Cancel opening").on_hover_text("Stop repeating its log; its directory stays as it is").clicked() {
             ask.push(Command::Cancel);
         }
         ui.separator();
@@ -30,7 +39,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     if let Some(session) = model.session() {
         scene(ui, session);
         ui.separator();
-        doing(ui, model, session, ask);
+        ui.scope(|ui| doing(ui, model, session, ask));
     }
     ui.separator();
     egui::CollapsingHeader::new("New episode").default_open(false).show(ui, |ui| form(ui, model, ask));
@@ -64,7 +73,11 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
 }
 
 fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Command>) {
-    for row in [[MenuCommand::Decide, MenuCommand::DoIt], [MenuCommand::Run, MenuCommand::Cancel]] {
+    super::framed(ui);
+    // While it runs, the button that began the run pauses it.
+    let runs = session.activity == Activity::Running;
+    let run = if runs { MenuCommand::Pause } else { MenuCommand::Run };
+    for row in [[MenuCommand::Decide, MenuCommand::DoIt], [run, MenuCommand::Cancel]] {
         ui.columns(2, |columns| {
             for (ui, entry) in columns.iter_mut().zip(row) {
                 let size = egui::vec2(ui.available_width(), 24.0);
@@ -79,7 +92,7 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
     let doing = match session.activity {
         Activity::Idle if session.is_finished() => "the budget is used up",
         Activity::Idle if session.read_only.is_some() => "to look at only",
-        Activity::Idle if session.pending.is_some() => "decided; do it, or something else",
+        Activity::Idle if session.pending.is_some() => "decided",
         Activity::Idle => "ready",
         Activity::Opening { .. } => "opening",
         Activity::Deciding => "deciding…",
@@ -91,12 +104,35 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
 }
 
 fn form(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
+    super::framed(ui);
     let form = &mut model.kept.form;
     let name = form.scene.as_ref().and_then(|path| path.file_stem()).map(|stem| stem.to_string_lossy().into_owned());
-    egui::Grid::new("form").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
+    ui.horizontal(|ui| {
         ui.label("scene");
-        ui.label(name.as_deref().unwrap_or("none yet"));
-        ui.end_row();
+        ui.add(egui::Label::new(name.as_deref().unwrap_or("none yet")).truncate());
+    });
+    choices(ui, form);
+    ui.horizontal(|ui| {
+        let start = ui.add_enabled(form.scene.is_some(), egui::Button::new(start_title(form)));
+        let hint = "Start an episode of this scene with these choices";
+        if start.on_hover_text(hint).on_disabled_hover_text("Choose a scene first").clicked() {
+            ask.push(Command::Start);
+        }
+        let scenes = MenuCommand::Scenes;
+        if ui.button("Scenes…").on_hover_text(scenes.tooltip()).clicked() {
+            ask.push(Command::Menu(scenes));
+        }
+    });
+}
+
+/// What the button says that starts an episode.
+pub fn start_title(form: &StartForm) -> &'static str {
+    if form.against.is_some() { "Start both" } else { "Start" }
+}
+
+/// Draws with what an episode is started.
+pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
+    egui::Grid::new("form").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
         let label = ui.label("policy");
         egui::ComboBox::from_id_salt("policy")
             .selected_text(form.policy.to_string())
@@ -109,12 +145,30 @@ fn form(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
             .labelled_by(label.id)
             .on_hover_text("The rule that chooses actions");
         ui.end_row();
+        let label = ui.label("against");
+        egui::ComboBox::from_id_salt("against")
+            .selected_text(form.against.map_or("none".to_owned(), |policy| policy.to_string()))
+            .show_ui(ui, |ui| {
+                ui.selectable_value(&mut form.against, None, "none");
+                for policy in PolicyKind::ALL {
+                    ui.selectable_value(&mut form.against, Some(policy), policy.to_string());
+                }
+            })
+            .response
+            .labelled_by(label.id)
+            .on_hover_text("A second policy that runs side by side, to compare with");
+        ui.end_row();
         let label = ui.label("belief");
         egui::ComboBox::from_id_salt("belief")
             .selected_text(&form.belief)
             .show_ui(ui, |ui| {
-                for belief in ["classical"] {
-                    ui.selectable_value(&mut form.belief, belief.to_owned(), belief);
+                for belief in &BELIEFS {
+                    let missing = MISSING.get(belief);
+                    let choice = egui::Button::selectable(form.belief == *belief, *belief);
+                    let choice = ui.add_enabled(missing.is_none(), choice);
+                    if choice.on_disabled_hover_text(missing.map_or("", String::as_str)).clicked() {
+                        form.belief = (*belief).to_owned();
+                    }
                 }
             })
             .response
@@ -124,30 +178,59 @@ fn form(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
         let label = ui.label("budget");
         ui.add(egui::DragValue::new(&mut form.budget).range(1..=200).suffix(" actions"))
             .labelled_by(label.id)
-            .on_hover_text("Number of actions, 20 for a robot, 40 in simulation");
+            .on_hover_text("Number of actions, 1 to 200; 20 for a robot, 40 in simulation");
         ui.end_row();
         let label = ui.label("seed");
-        ui.add(egui::DragValue::new(&mut form.seed)).labelled_by(label.id).on_hover_text("Seed of every random choice");
+        ui.add(egui::DragValue::new(&mut form.seed))
+            .labelled_by(label.id)
+            .on_hover_text("Seed of every random choice, any whole number from 0");
         ui.end_row();
         let label = ui.label("candidates");
         ui.add(egui::DragValue::new(&mut form.planner.candidates).range(0..=1000))
             .labelled_by(label.id)
-            .on_hover_text("Push candidates drawn per decision, k = 80");
+            .on_hover_text("Push candidates drawn per decision, 0 to 1000; k = 80 in the paper");
         ui.end_row();
         let label = ui.label("γ");
         ui.add(egui::DragValue::new(&mut form.planner.gamma).range(0.0..=10.0).speed(0.01))
             .labelled_by(label.id)
-            .on_hover_text("Weight of the disturbance term: look if IGV > IGM + γ Reg");
+            .on_hover_text("Weight of the disturbance term, 0 to 10: look if IGV > IGM + γ Reg");
         ui.end_row();
     });
-    ui.horizontal(|ui| {
-        let start = ui.add_enabled(form.scene.is_some(), egui::Button::new("Start"));
-        if start.on_hover_text("Start an episode of this scene with these choices").clicked() {
-            ask.push(Command::Start);
+    ui.collapsing("Thresholds", |ui| thresholds(ui, &mut form.planner));
+}
+
+/// A share between 0 and 1.
+fn share(value: &mut f32) -> egui::DragValue<'_> {
+    egui::DragValue::new(value).range(0.0..=1.0).speed(0.005).fixed_decimals(2)
+}
+
+/// The planner's thresholds.
+fn thresholds(ui: &mut egui::Ui, planner: &mut PlannerSettings) {
+    egui::Grid::new("thresholds").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
+        let label = ui.label("certain above");
+        ui.add(share(&mut planner.certain))
+            .labelled_by(label.id)
+            .on_hover_text("A floor cell is certain if max p is above this, 0 to 1; 0.85 in the paper");
+        ui.end_row();
+        let label = ui.label("complete at");
+        ui.add(share(&mut planner.complete))
+            .labelled_by(label.id)
+            .on_hover_text("Nothing is pushed once this share of the floor is certain, 0 to 1; 0.95 in the paper");
+        ui.end_row();
+        let label = ui.label("no push before");
+        ui.add(egui::DragValue::new(&mut planner.quiet_steps).range(0..=50).suffix(" looks"))
+            .labelled_by(label.id)
+            .on_hover_text("The first steps, in which nothing is pushed, 0 to 50; 3 in the paper");
+        ui.end_row();
+        let label = ui.label("saturated below");
+        ui.add(share(&mut planner.saturation))
+            .labelled_by(label.id)
+            .on_hover_text("The policy saturation pushes if two best gains differ by less than this share; 0.02");
+        ui.end_row();
+        if ui.small_button("As in the paper").on_hover_text("Puts all numbers of the planner back").clicked() {
+            *planner = PlannerSettings::default();
         }
-        if ui.button("Open scene…").on_hover_text(MenuCommand::OpenScene.tooltip()).clicked() {
-            ask.push(Command::Menu(MenuCommand::OpenScene));
-        }
+        ui.end_row();
     });
 }
 
@@ -155,14 +238,10 @@ fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
     ui.separator();
     ui.weak("Open episodes");
     for session in &model.sessions {
-        ui.horizontal(|ui| {
+        // From the right, so that a long title gives way to the button beside it.
+        let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(size, egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let is_shown = model.shown == Some(session.id);
-            let busy = if session.activity == Activity::Idle { "" } else { " …" };
-            let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
-            let row = ui.add(egui::Button::selectable(is_shown, title).truncate());
-            if row.on_hover_text(session.path.display().to_string()).clicked() {
-                ask.push(Command::Show(session.id));
-            }
             if !is_shown {
                 let compare = ui.small_button("A|B");
                 compare.widget_info(|| {
@@ -173,6 +252,14 @@ fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
                     ask.push(Command::CompareWith(Some(session.id)));
                 }
             }
+            ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
+                let busy = if session.activity == Activity::Idle { "" } else { " …" };
+                let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
+                let row = ui.add(egui::Button::selectable(is_shown, title).truncate());
+                if row.on_hover_text(session.path.display().to_string()).clicked() {
+                    ask.push(Command::Show(session.id));
+                }
+            });
         });
     }
 }

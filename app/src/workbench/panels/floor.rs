@@ -109,6 +109,8 @@ pub struct Drawn {
     pub frame: Frame,
     /// The cell under the pointer.
     pub over: Option<usize>,
+    /// The cell that was clicked, or that the arrow keys went to.
+    pub chosen: Option<usize>,
 }
 
 impl Drawn {
@@ -132,7 +134,26 @@ impl FloorMap<'_> {
         if ui.is_rect_visible(rect) {
             self.paint(ui, rect, &frame, over);
         }
-        Drawn { response, frame, over }
+        let chosen = match super::arrows(ui, &response) {
+            Some(by) => Some(self.beside(by)),
+            // Enter on a map that has the focus is a click without a place.
+            None => response.clicked().then(|| over.unwrap_or_else(|| self.beside([0, 0]))),
+        };
+        Drawn { response, frame, over, chosen }
+    }
+
+    /// The cell so many cells beside the picked one, or beside the middle; on the floor.
+    fn beside(&self, [right, back]: [i32; 2]) -> usize {
+        let [width, depth, _] = self.grid.dims;
+        let from = self.picked.filter(|cell| *cell < self.grid.cell_count());
+        let from = from.map_or([width / 2, depth / 2], |cell| {
+            let at = self.grid.cell(cell);
+            [usize::from(at.x), usize::from(at.y)]
+        });
+        let step = |at: usize, by: i32, count: usize| {
+            (at as i64 + i64::from(by)).clamp(0, count.saturating_sub(1) as i64) as usize
+        };
+        step(from[0], right, width) * depth + step(from[1], back, depth)
     }
 
     fn paint(&self, ui: &Ui, rect: Rect, frame: &Frame, over: Option<usize>) {
@@ -198,6 +219,17 @@ mod tests {
         for cell in 0..grid.cell_count() {
             assert_eq!(in_window(&window, &grid, cell), listed.iter().position(|other| *other == cell));
         }
+    }
+
+    #[test]
+    fn the_arrow_keys_walk_over_the_floor_and_stop_at_its_edges() {
+        let grid = Grid::for_shelf([0.8, 0.4, 0.3], 0.01);
+        let map = |picked| FloorMap { grid: &grid, picture: None, outlines: &[], picked, apron_m: 0.0, name: "" };
+        let at = |cell: usize| [grid.cell(cell).x, grid.cell(cell).y];
+        assert_eq!(at(map(None).beside([1, -1])), [41, 19]);
+        assert_eq!(at(map(Some(map(None).beside([1, -1]))).beside([-10, 0])), [31, 19]);
+        assert_eq!(at(map(Some(0)).beside([-10, 10])), [0, 10]);
+        assert_eq!(at(map(Some(usize::MAX)).beside([0, 1])), [40, 21]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::facts::{self, fact};
 use super::legend::{self, Bar};
-use super::{NO_EPISODE, Touched, empty, heading, spark, weighed, words};
+use super::{NO_EPISODE, Touched, decision, empty, heading, spark, weighed, words};
 use crate::colors::Colormap;
 use crate::workbench::command::Command;
 use crate::workbench::model::{GainSource, Hovered, Model};
@@ -45,14 +45,14 @@ pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     model.panels.gains = state;
 }
 
-fn draw(state: &mut State, ui: &mut Ui, model: &Model, _ask: &mut Vec<Command>) -> Touched {
+fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
     let mut touched = Touched::default();
     let Some(session) = model.session() else {
         empty(ui, NO_EPISODE);
         return touched;
     };
     let Some(decision) = session.decision_after(model.cursor) else {
-        empty(ui, "Nothing weighed yet: decide, to see the gain of every view");
+        decision::nothing(ui, session, "the gain of every view", ask);
         return touched;
     };
     if decision.gains.iter().all(|gain| !gain.is_finite()) {
@@ -191,6 +191,17 @@ impl<'a> HeatMap<'a> {
             views.iter().filter(|view| self.selected == Some(view.id)).for_each(|view| ring(view, 2.0));
             let pointed = over.map(|view| view.id).or(self.hovered);
             views.iter().filter(|view| pointed == Some(view.id)).for_each(|view| ring(view, 1.0));
+        }
+        if let Some([right, up]) = super::arrows(ui, &response) {
+            let slot = views
+                .iter()
+                .find(|view| self.selected == Some(view.id))
+                .map_or([0, 0], |view| [i64::from(view.slot[0]), i64::from(view.slot[1])]);
+            let wanted = [slot[0] + i64::from(right), slot[1] + i64::from(up)];
+            let beside = |view: &&&View| [i64::from(view.slot[0]), i64::from(view.slot[1])] == wanted;
+            touched.view = views.iter().find(beside).map(|view| view.id);
+        } else if response.clicked() && over.is_none() {
+            touched.view = views.first().map(|view| view.id);
         }
         if let Some(view) = over {
             touched.over = Some(Hovered::View(view.id));
@@ -333,7 +344,6 @@ fn framed(painter: &Painter, square: Rect, rank: &str, ui: &Ui) {
 mod tests {
     use super::*;
     use nudge_core::grid::Voxel;
-    use std::sync::Arc;
 
     #[test]
     fn a_gain_is_parted_by_height_and_depth() {
@@ -341,7 +351,7 @@ mod tests {
         let at = |y: u16, z: u16| grid.index(Voxel { x: 3, y, z });
         let nats =
             vec![(at(0, 39), 1.0), (at(39, 0), 2.0), (at(39, 5), 4.0), (grid.voxel_count(), 9.0), (at(1, 1), f32::NAN)];
-        let source = GainSource { of: (SessionId(0), 1), view: ViewId(3), nats: Arc::new(nats) };
+        let source = GainSource::new((SessionId(0), 1), ViewId(3), nats);
         let spread = Spread::of(&source, &grid);
         assert_eq!((spread.by_height[0], spread.by_height[1], spread.by_height[7]), (2.0, 4.0, 1.0));
         assert_eq!((spread.by_depth[0], spread.by_depth[7], spread.total), (1.0, 6.0, 7.0));

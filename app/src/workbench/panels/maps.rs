@@ -60,34 +60,32 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         return model.slice_m;
     };
     let mut slice_m = model.slice_m;
-    egui::ScrollArea::vertical().id_salt("maps").auto_shrink(false).show(ui, |ui| {
-        slice_m = controls(ui, &derived.belief.grid, slice_m, derived.of.1, model.cursor.min(session.steps()));
-        let level = slice_m.map(|height| level_at(&derived.belief.grid, height));
-        let first = level.map_or(Shown::Map(MapKind::Semantics), Shown::Slice);
-        let kinds = MapKind::ALL[1..].iter().map(|kind| Shown::Map(*kind));
-        let shown: Vec<Shown> = std::iter::once(first).chain(kinds).collect();
-        let gap = 10.0;
-        let columns = if ui.available_width() < 300.0 { 1 } else { 2 };
-        let width = ((ui.available_width() - gap * (columns - 1) as f32) / columns as f32).floor().max(40.0);
-        // The legend of the classes takes the place after the last map.
-        let places: Vec<Option<Shown>> = shown.into_iter().map(Some).chain([None]).collect();
-        for row in places.chunks(columns) {
-            ui.horizontal_top(|ui| {
-                ui.spacing_mut().item_spacing.x = gap;
-                for place in row {
-                    ui.vertical(|ui| {
-                        ui.set_width(width);
-                        ui.spacing_mut().item_spacing.y = 3.0;
-                        match place {
-                            Some(shown) => map(state, ui, model, session, &derived, *shown, ask),
-                            None => classes(ui, session),
-                        }
-                    });
-                }
-            });
-            ui.add_space(6.0);
-        }
-    });
+    slice_m = controls(ui, &derived.belief.grid, slice_m, derived.of.1, model.cursor.min(session.steps()));
+    let level = slice_m.map(|height| level_at(&derived.belief.grid, height));
+    let first = level.map_or(Shown::Map(MapKind::Semantics), Shown::Slice);
+    let kinds = MapKind::ALL[1..].iter().map(|kind| Shown::Map(*kind));
+    let shown: Vec<Shown> = std::iter::once(first).chain(kinds).collect();
+    let gap = 10.0;
+    let columns = if ui.available_width() < 300.0 { 1 } else { 2 };
+    let width = ((ui.available_width() - gap * (columns - 1) as f32) / columns as f32).floor().max(40.0);
+    // The legend of the classes takes the place after the last map.
+    let places: Vec<Option<Shown>> = shown.into_iter().map(Some).chain([None]).collect();
+    for row in places.chunks(columns) {
+        ui.horizontal_top(|ui| {
+            ui.spacing_mut().item_spacing.x = gap;
+            for place in row {
+                ui.vertical(|ui| {
+                    ui.set_width(width);
+                    ui.spacing_mut().item_spacing.y = 3.0;
+                    match place {
+                        Some(shown) => map(state, ui, model, session, &derived, *shown, ask),
+                        None => classes(ui, session),
+                    }
+                });
+            }
+        });
+        ui.add_space(6.0);
+    }
     slice_m
 }
 
@@ -159,9 +157,7 @@ fn map(
             value(derived, &moment.truth, session, shown, cell)
         )
     });
-    if drawn.response.clicked()
-        && let Some(cell) = drawn.over
-    {
+    if let Some(cell) = drawn.chosen {
         ask.push(Command::Pick(Some(Picked::Cell(cell))));
     }
     map_legend(ui, shown, &grid);

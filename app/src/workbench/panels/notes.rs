@@ -20,13 +20,11 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
         return;
     };
     let step = model.cursor.min(session.steps());
-    egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
-        note(ui, session, step, ask);
-        list(ui, session, step, ask);
-        ui.add_space(6.0);
-        ui.separator();
-        verdicts(ui, session, step, ask);
-    });
+    note(ui, session, step, ask);
+    list(ui, session, step, ask);
+    ui.add_space(6.0);
+    ui.separator();
+    verdicts(ui, session, step, ask);
 }
 
 fn note(ui: &mut egui::Ui, session: &Session, step: usize, ask: &mut Vec<Command>) {

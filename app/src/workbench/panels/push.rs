@@ -86,12 +86,13 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         match decision.filter(|decision| !decision.candidates.is_empty()) {
             Some(decision) => here.candidates(state, ui, decision, &mut touched, ask),
             None => {
-                let text = match decision {
-                    None => "Nothing weighed yet: decide, to see what pushes would do",
-                    Some(_) => "No push was considered before this step",
-                };
                 heading(ui, "Push candidates", "");
-                ui.weak(text);
+                match decision {
+                    None => decision::nothing(ui, session, "what pushes would do", ask),
+                    Some(_) => {
+                        ui.weak("No push was considered before this step");
+                    }
+                }
             }
         }
         here.review(state, ui);
@@ -287,7 +288,7 @@ impl Here<'_> {
                     let change = words::probability(change_at(prediction, &grid, cell));
                     format!("{}\nchanges with probability {change}", words::cell_place(&grid, grid.cell(cell)))
                 });
-                if let Some(cell) = drawn.over.filter(|_| drawn.response.clicked()) {
+                if let Some(cell) = drawn.chosen {
                     ask.push(Command::Pick(Some(Picked::Cell(cell))));
                 }
             });

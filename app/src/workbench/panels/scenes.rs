@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests;
 
+use super::episode::{choices, start_title};
 use crate::workbench::author::Author;
 use crate::workbench::browser::{Browser, Entry, Look};
 use crate::workbench::command::{Command, Level, MenuCommand};
@@ -24,13 +25,20 @@ const TEXT_HEIGHT: f32 = 74.0;
 pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     let context = ui.ctx().clone();
     let wake: Wake = Arc::new(move || context.request_repaint());
+    let goes_back = !model.sessions.is_empty();
     let Model { browser, kept, author, .. } = model;
     browser.poll(&kept.recent, &wake);
-    head(ui, browser, &wake, ask);
+    head(ui, browser, goes_back, &wake, ask);
     ui.separator();
-    let chosen = kept.form.scene.as_deref();
+    let (chosen, title) = (kept.form.scene.clone(), start_title(&kept.form));
     let bottom = egui::Panel::bottom("scenes start").show_separator_line(true);
-    bottom.show(ui, |ui| foot(ui, chosen, author, ask));
+    bottom.show(ui, |ui| foot(ui, chosen.as_deref(), title, author, ask));
+    egui::Panel::right("scenes with").default_size(236.0).size_range(210.0..=340.0).show(ui, |ui| {
+        ui.add_space(4.0);
+        ui.strong("Episode").on_hover_text("With what the episode is started");
+        ui.add_space(2.0);
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| choices(ui, &mut kept.form));
+    });
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
         if browser.entries().is_empty() {
             empty(ui, browser);
@@ -40,8 +48,11 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
     });
 }
 
-fn head(ui: &mut egui::Ui, browser: &mut Browser, wake: &Wake, ask: &mut Vec<Command>) {
+fn head(ui: &mut egui::Ui, browser: &mut Browser, goes_back: bool, wake: &Wake, ask: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
+        if goes_back && ui.button("Back").on_hover_text("Go back to the open episode (Esc)").clicked() {
+            ask.push(Command::Browse(false));
+        }
         let search = egui::TextEdit::singleline(&mut browser.search).hint_text("Search scenes").desired_width(150.0);
         named(ui.add(search), "Search scenes");
         let typed = egui::TextEdit::singleline(&mut browser.typed).hint_text("Path of a scene or an episode");
@@ -62,10 +73,11 @@ fn head(ui: &mut egui::Ui, browser: &mut Browser, wake: &Wake, ask: &mut Vec<Com
     });
 }
 
-fn foot(ui: &mut egui::Ui, chosen: Option<&Path>, author: &mut Author, ask: &mut Vec<Command>) {
+fn foot(ui: &mut egui::Ui, chosen: Option<&Path>, title: &str, author: &mut Author, ask: &mut Vec<Command>) {
     ui.add_space(4.0);
     ui.horizontal(|ui| {
-        let start = named(ui.add_enabled(chosen.is_some(), egui::Button::new("▶ Start")), "Start");
+        let start = ui.add_enabled(chosen.is_some(), egui::Button::new(format!("▶ {title}")));
+        let start = named(start, title);
         let start =
             start.on_hover_text("Start an episode of the chosen scene").on_disabled_hover_text("Choose a scene");
         if start.clicked() {

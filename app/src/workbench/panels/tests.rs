@@ -129,7 +129,7 @@ fn a_click_on_a_map_asks_about_its_cell() {
         assert!(harness.query_by_label(title).is_some(), "{title}");
     }
     let map = harness.get_by_label("Map of truth").rect();
-    let at = map.left_bottom() + egui::vec2(0.25 * map.width(), -0.5);
+    let at = map.left_bottom() + egui::vec2(0.25 * map.width() + 1.0, -0.5);
     click_at(&mut harness, at);
     let cell = asked(&harness, |command| match command {
         Command::Pick(Some(Picked::Cell(cell))) => Some(*cell),

@@ -36,7 +36,7 @@ impl<K: PartialEq> Textures<K> {
             self.kept.push(found);
         } else {
             if self.kept.len() == KEPT {
-                self.kept.remove(0);
+                drop(self.kept.remove(0));
             }
             self.kept.push((key, ctx.load_texture("panel", paint(), options)));
         }
@@ -58,7 +58,7 @@ mod tests {
     fn a_picture_is_painted_once_and_the_oldest_go() {
         let (ctx, mut textures, mut painted) = (Context::default(), Textures::<usize>::default(), 0);
         let mut ask = |key: usize| {
-            textures.get(&ctx, key, || {
+            let _picture = textures.get(&ctx, key, || {
                 painted += 1;
                 ColorImage::filled([2, 2], Color32::WHITE)
             });

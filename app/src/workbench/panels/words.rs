@@ -80,6 +80,7 @@ pub fn rejection(rejection: &Rejection) -> String {
         Rejection::StartBlocked { at } => format!("the tool would start in something at {}", place(at)),
         Rejection::PathBlocked { at } => format!("something is in the way at {}", place(at)),
         Rejection::Shelf => "the tool would touch the shelf".to_owned(),
+        arm @ (Rejection::Unreachable { .. } | Rejection::ArmBlocked { .. } | Rejection::NoWay) => arm.to_string(),
     }
 }
 

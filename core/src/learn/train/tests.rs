@@ -9,6 +9,7 @@ fn recipe() -> Recipe {
     Recipe {
         catalog: Catalog::standard(),
         scenes: GenerateConfig::default(),
+        pusher: crate::arm::Pusher::default(),
         views: ViewArray::named("standard300").expect("shipped"),
         noise_share: 0.0,
     }

@@ -52,6 +52,8 @@ fn several(ui: &mut egui::Ui, author: &Author) {
 
 /// How a number of an object is shown and dragged.
 struct Unit {
+    /// What it is, with its range.
+    hint: &'static str,
     speed: f64,
     decimals: usize,
     prefix: &'static str,
@@ -59,10 +61,31 @@ struct Unit {
     range: RangeInclusive<f32>,
 }
 
-const MILLIMETRES: Unit = Unit { speed: 1.0, decimals: 1, prefix: "", suffix: " mm", range: -5000.0..=5000.0 };
-const DEGREES: Unit = Unit { speed: 1.0, decimals: 1, prefix: "", suffix: "°", range: -360.0..=360.0 };
+const MILLIMETRES: Unit = Unit {
+    hint: "Millimetres; drag, or click to type",
+    speed: 1.0,
+    decimals: 1,
+    prefix: "",
+    suffix: " mm",
+    range: -5000.0..=5000.0,
+};
+const DEGREES: Unit = Unit {
+    hint: "Degrees, −180 to 180, counter-clockwise seen from above",
+    speed: 1.0,
+    decimals: 1,
+    prefix: "",
+    suffix: "°",
+    range: -360.0..=360.0,
+};
 /// Factors that leave an object an object.
-const FACTOR: Unit = Unit { speed: 0.005, decimals: 2, prefix: "×", suffix: "", range: 0.05..=20.0 };
+const FACTOR: Unit = Unit {
+    hint: "Factor, 0.05 to 20; 1 is the catalogue's size",
+    speed: 0.005,
+    decimals: 2,
+    prefix: "×",
+    suffix: "",
+    range: 0.05..=20.0,
+};
 
 /// A number of the chosen object. Its step ends when the pointer or the keyboard lets go.
 fn field(
@@ -80,7 +103,7 @@ fn field(
         .prefix(unit.prefix)
         .suffix(unit.suffix)
         .range(unit.range);
-    let response = named(ui.add(drag), label);
+    let response = named(ui.add(drag), label).on_hover_text(unit.hint);
     if changed != value {
         author.change_selected(Edit::Field(label), |object| set(object, changed));
     }
@@ -110,7 +133,7 @@ fn object(ui: &mut egui::Ui, author: &mut Author, at: usize) {
                 ui.selectable_value(&mut wanted, class.name.clone(), colors::class_title(&catalog, class.id));
             }
         });
-        named(combo.response, "Class");
+        named(combo.response, "Class").on_hover_text("Makes the object another class; a mesh of its own goes");
         if wanted != object.class {
             author.change_class(&wanted);
         }
@@ -243,16 +266,19 @@ fn generate(ui: &mut egui::Ui, author: &mut Author) {
     egui::Grid::new("author generate").num_columns(2).spacing([12.0, 6.0]).show(ui, |ui| {
         ui.label("Fill").on_hover_text("Share of the floor that objects shall cover, those that are there included");
         let mut percent = 100.0 * author.fill.fill;
-        let slider = egui::Slider::new(&mut percent, 5.0..=60.0).fixed_decimals(0).suffix(" %");
-        if named(ui.add(slider), "Fill").changed() {
+        let slider = egui::Slider::new(&mut percent, 5.0..=60.0).fixed_decimals(0).suffix(" %").text("of the floor");
+        let fill = named(ui.add(slider), "Fill").on_hover_text("Share of the floor, 5 to 60 %");
+        if fill.changed() {
             author.fill.fill = percent / 100.0;
         }
         ui.end_row();
         ui.label("Regularity").on_hover_text("0 places freely, 1 lines objects up behind each other");
-        named(ui.add(egui::Slider::new(&mut author.fill.rho, 0.0..=1.0).fixed_decimals(1)), "Regularity");
+        named(ui.add(egui::Slider::new(&mut author.fill.rho, 0.0..=1.0).fixed_decimals(1).text("ρ")), "Regularity")
+            .on_hover_text("ρ, 0 to 1");
         ui.end_row();
         ui.label("Seed").on_hover_text("Of every random choice; goes on by one after each use");
-        named(ui.add(DragValue::new(&mut author.fill.seed).speed(0.1)), "Seed");
+        named(ui.add(DragValue::new(&mut author.fill.seed).speed(0.1)), "Seed")
+            .on_hover_text("Any whole number from 0");
         ui.end_row();
     });
     ui.horizontal(|ui| {
@@ -301,7 +327,7 @@ fn scene(ui: &mut egui::Ui, author: &mut Author) {
             for (axis, label) in ["Shelf width", "Shelf depth", "Shelf height"].into_iter().enumerate() {
                 let mut size = author.scene().shelf.size[axis];
                 let drag = DragValue::new(&mut size).speed(0.005).fixed_decimals(2).range(0.1..=2.0).suffix(" m");
-                let response = named(ui.add(drag), label);
+                let response = named(ui.add(drag), label).on_hover_text("Metres, 0.1 to 2");
                 if size != author.scene().shelf.size[axis] {
                     author.edit(Edit::Field(label), |scene| scene.shelf.size[axis] = rounded(size));
                 }

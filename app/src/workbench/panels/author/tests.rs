@@ -82,7 +82,7 @@ fn dragging_moves_an_object_into_another_and_the_overlap_is_told_in_words() {
     harness.key_press_modifiers(Modifiers::COMMAND, egui::Key::Z);
     harness.run_steps(3);
     assert_eq!(author(&harness).scene().objects[0].position, [-0.1, 0.2]);
-    assert!(!has(&harness, "overlaps"));
+    assert!(!has(&harness, "overlaps gum_tin#1"));
 }
 
 #[test]

@@ -5,6 +5,8 @@ use crate::workbench::panels::photo;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
+const FIELD: egui::accesskit::Role = egui::accesskit::Role::MultilineTextInput;
+
 /// A model whose orders are carried out as the window does.
 struct Stage {
     model: Model,
@@ -43,11 +45,11 @@ fn has(harness: &Harness<'_, Stage>, text: &str) -> bool {
 #[test]
 fn a_note_is_kept_letter_by_letter_and_listed() {
     let mut harness = harness();
-    harness.get_by_label("Note on step 5").focus();
+    harness.get_by_role_and_label(FIELD, "Note on step 5").focus();
     harness.run_steps(2);
-    harness.get_by_label("Note on step 5").type_text("the can behind");
+    harness.get_by_role_and_label(FIELD, "Note on step 5").type_text("the can behind");
     harness.run_steps(2);
-    harness.get_by_label("Note on step 5").type_text(" the box");
+    harness.get_by_role_and_label(FIELD, "Note on step 5").type_text(" the box");
     harness.run_steps(3);
     let session = harness.state().model.session().expect("an episode");
     assert_eq!(session.annotations.notes.get(&5).map(String::as_str), Some("the can behind the box"));

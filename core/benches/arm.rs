@@ -2,19 +2,20 @@
 //!
 //! Times of one thread are processor times, so that a busy machine does not count.
 
-use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, Pusher, RobotPlacement, Space, level_tool, plan};
+use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, Pusher, level_tool, plan};
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, project, render};
 use nudge_core::grid::VoxelSet;
 use nudge_core::push::sample_by;
 use nudge_core::rng::stream;
-use nudge_core::scene::{Catalog, Scene};
+use nudge_core::scene::{Catalog, RobotPlacement, Scene};
 use nudge_core::world::{TruthMap, World};
 use parry3d::query::distance;
 use parry3d::shape::{Ball, Voxels};
 use rand::Rng;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 fn main() {
@@ -35,7 +36,8 @@ struct Crowded {
 
 fn scenes() -> Vec<Crowded> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/high");
-    let mut files: Vec<PathBuf> = std::fs::read_dir(folder).expect("scenes").map(|e| e.expect("entry").path()).collect();
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(folder).expect("scenes").map(|e| e.expect("entry").path()).collect();
     files.sort();
     let catalog = Catalog::standard();
     let crowded = |path: PathBuf| {
@@ -78,7 +80,11 @@ fn distances(arm: &Arm, crowded: &Crowded) {
     let rooms = processor_s(|| near.iter().for_each(|q| _ = black_box(space.room_m(q))));
     row("room of a configuration in the shelf, us", rooms * 1e6 / near.len() as f64, None);
     let free = near.iter().filter(|q| space.is_free(q)).count();
-    println!("  {free} of {} random ones in the shelf are free; {} balls", near.len(), arm.parts().map(|(_, p)| p.balls.len()).sum::<usize>());
+    println!(
+        "  {free} of {} random ones in the shelf are free; {} balls",
+        near.len(),
+        arm.parts().map(|(_, p)| p.balls.len()).sum::<usize>()
+    );
 
     let points: Vec<_> = near
         .iter()
@@ -92,7 +98,8 @@ fn distances(arm: &Arm, crowded: &Crowded) {
         })
         .filter(|(center, radius)| center.y > -radius)
         .collect();
-    let by_field = 0.01 * processor_s(|| (0..100).for_each(|_| points.iter().for_each(|(p, _)| _ = black_box(field.distance_m(p)))));
+    let by_field = 0.01
+        * processor_s(|| (0..100).for_each(|_| points.iter().for_each(|(p, _)| _ = black_box(field.distance_m(p)))));
     row("ball to map by distance field, ns", by_field * 1e9 / points.len() as f64, None);
     let keys: Vec<_> = crowded
         .occupied
@@ -147,7 +154,8 @@ fn queries(scenes: &[Crowded]) {
             let goals = [vec![goal]];
             let mut found = None;
             let settings = PlanSettings { rounds: 20_000, shortcuts: 40 };
-            let seconds = processor_s(|| found = plan(&space, &ready, &goals, settings, &mut stream(1, "query", asked)));
+            let seconds =
+                processor_s(|| found = plan(&space, &ready, &goals, settings, &mut stream(1, "query", asked)));
             if let Some(planned) = found {
                 solvable += 1;
                 solved_in_time += usize::from(seconds <= 0.2);
@@ -159,12 +167,20 @@ fn queries(scenes: &[Crowded]) {
     }
     times.sort_by(f64::total_cmp);
     rounds.sort_by(f64::total_cmp);
-    let at = |list: &[f64], share: f64| list.get((share * (list.len() as f64 - 1.0)) as usize).copied().unwrap_or(f64::NAN);
-    println!("{asked} random queries in {} crowded shelves: {solvable} solved in 20,000 rounds, {straight} straight", scenes.len());
+    let at =
+        |list: &[f64], share: f64| list.get((share * (list.len() as f64 - 1.0)) as usize).copied().unwrap_or(f64::NAN);
+    println!(
+        "{asked} random queries in {} crowded shelves: {solvable} solved in 20,000 rounds, {straight} straight",
+        scenes.len()
+    );
     row("  planning query, median, ms", at(&times, 0.5), Some(20.0));
     row("  planning query, 95th percentile, ms", at(&times, 0.95), None);
     row("  rounds, median", at(&rounds, 0.5), None);
-    row("  solved within 200 ms of those solved at all, %", 100.0 * solved_in_time as f64 / solvable as f64, Some(99.0));
+    row(
+        "  solved within 200 ms of those solved at all, %",
+        100.0 * solved_in_time as f64 / solvable as f64,
+        Some(99.0),
+    );
 }
 
 /// 80 feasible candidates of a mid-episode belief, and what becomes of the pushes.
@@ -178,12 +194,19 @@ fn pushes(scenes: &[Crowded]) {
             let image = render(&scene.shelf, &bodies, view, &views.intrinsics);
             belief = Classical.observe(&belief, &project(&image, view, &views.intrinsics, &scene.shelf));
         }
-        let pusher = Pusher::Arm(Box::new(ArmTool::standard(scene.shelf)));
+        let pusher = Pusher::Arm(Arc::new(ArmTool::standard(scene.shelf)));
         let (wall, processor) = (Instant::now(), process_s());
         let candidates = sample_by(&belief, &pusher, 80, &mut stream(1, "pushes", 0));
         let (wall, processor) = (wall.elapsed().as_secs_f64(), process_s() - processor);
         let feasible: Vec<_> = candidates.iter().filter_map(|c| c.motion.as_ref()).collect();
-        println!("{}: {} drawn, {} feasible, {:.2} s, {:.2} s of processor", crowded.name, candidates.len(), feasible.len(), wall, processor);
+        println!(
+            "{}: {} drawn, {} feasible, {:.2} s, {:.2} s of processor",
+            crowded.name,
+            candidates.len(),
+            feasible.len(),
+            wall,
+            processor
+        );
         let mut reasons = std::collections::BTreeMap::<String, usize>::new();
         for rejection in candidates.iter().filter_map(|c| c.rejection.as_ref()) {
             let words = rejection.to_string();
@@ -191,7 +214,11 @@ fn pushes(scenes: &[Crowded]) {
             *reasons.entry(words.to_owned()).or_default() += 1;
         }
         println!("  rejected: {reasons:?}");
-        row("  80 candidates on two idle cores at most, s", processor / 2.0 * 80.0 / feasible.len().max(1) as f64, Some(0.6));
+        row(
+            "  80 candidates on two idle cores at most, s",
+            processor / 2.0 * 80.0 / feasible.len().max(1) as f64,
+            Some(0.6),
+        );
         let Pusher::Arm(tool) = &pusher else { continue };
         let mut world = World::new(scene.shelf, bodies.clone());
         world.settle();

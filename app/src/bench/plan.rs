@@ -1,0 +1,337 @@
+//! What a bench consists of: sets of scenes, policies, seeds, a budget, and which share of it is this shard's.
+
+use nudge_core::files::names_in;
+use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::scene::{Catalog, Scene};
+use nudge_core::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// The format number of `bench.json`.
+pub const FORMAT: u32 = 1;
+
+/// `bench.json`: which episodes a bench consists of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Format number, [`FORMAT`].
+    pub format: u32,
+    /// Version of the program that began it.
+    pub version: String,
+    /// Number of actions of every episode.
+    pub budget: usize,
+    /// Seeds 0 to `seeds - 1`, for policies that draw at random; the others run once.
+    pub seeds: u64,
+    /// Name of the view array.
+    pub views: String,
+    /// The planner's numbers.
+    pub planner: PlannerSettings,
+    /// The policies, in the order of tables.
+    pub policies: Vec<PolicyPlan>,
+    /// The sets.
+    pub sets: Vec<SetPlan>,
+    /// Scene files that could not be read; the rest runs.
+    pub broken: Vec<BrokenScene>,
+    /// The share of the episodes that this directory holds; all of them without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<Shard>,
+}
+
+/// A policy and the belief update that it runs with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PolicyPlan {
+    /// The policy.
+    pub policy: PolicyKind,
+    /// Name of the belief update.
+    pub belief: String,
+}
+
+/// A set of scenes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SetPlan {
+    /// Name of the set: of its folder, or of its file.
+    pub name: String,
+    /// Its scenes, in the order of their files.
+    pub scenes: Vec<ScenePlan>,
+}
+
+/// A scene of a set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScenePlan {
+    /// Name of its file without `.toml`: what results are filed under.
+    pub id: String,
+    /// Where it was read from.
+    pub file: String,
+    /// The scene itself.
+    pub scene: Scene,
+}
+
+/// A scene file that could not be read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BrokenScene {
+    /// The set that it belongs to.
+    pub set: String,
+    /// Name of its file without `.toml`.
+    pub id: String,
+    /// What is wrong, file and place named.
+    pub error: String,
+}
+
+/// The `index`-th of every `count` episodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Shard {
+    /// From 0.
+    pub index: usize,
+    /// Number of shards.
+    pub count: usize,
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let wrong = || format!("`{text}` is no shard: the first of four is 0/4, the last 3/4");
+        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
+        let shard = Self { index: index.parse().map_err(|_| wrong())?, count: count.parse().map_err(|_| wrong())? };
+        if shard.index < shard.count { Ok(shard) } else { Err(wrong()) }
+    }
+}
+
+/// One episode of a bench, by positions in its plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct EpisodeId {
+    /// Its set.
+    pub set: usize,
+    /// Its scene in the set.
+    pub scene: usize,
+    /// Its policy.
+    pub policy: usize,
+    /// Its seed.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// All episodes of the plan, or of its shard, in the order in which they run: first every scene and policy with
+    /// seed 0, so that an early look at the results sees all of them.
+    pub fn episodes(&self) -> Vec<EpisodeId> {
+        let Shard { index, count } = self.shard.unwrap_or(Shard { index: 0, count: 1 });
+        let all = self.all_episodes();
+        all.into_iter().enumerate().filter(|(at, _)| at % count == index).map(|(_, episode)| episode).collect()
+    }
+
+    fn all_episodes(&self) -> Vec<EpisodeId> {
+        let mut all = Vec::new();
+        for seed in 0..self.seeds {
+            for (set, in_set) in self.sets.iter().enumerate() {
+                for scene in 0..in_set.scenes.len() {
+                    let runs = |policy: &usize| seed == 0 || self.policies[*policy].policy.is_seeded();
+                    let policies = (0..self.policies.len()).filter(runs);
+                    all.extend(policies.map(|policy| EpisodeId { set, scene, policy, seed }));
+                }
+            }
+        }
+        all
+    }
+
+    /// An episode in words: `high/box-wall, random, seed 2`.
+    pub fn name(&self, id: EpisodeId) -> String {
+        let (set, policy) = (&self.sets[id.set], self.policies[id.policy].policy);
+        format!("{}/{}, {policy}, seed {}", set.name, set.scenes[id.scene].id, id.seed)
+    }
+
+    /// Where an episode's result lies, seen from the folder of results, without its ending.
+    pub fn place(&self, id: EpisodeId) -> PathBuf {
+        let set = &self.sets[id.set];
+        let file = format!("{}-{}", self.policies[id.policy].policy, id.seed);
+        Path::new(&set.name).join(&set.scenes[id.scene].id).join(file)
+    }
+
+    /// What keeps this plan from going on with the results of `before`: the first thing that differs, in words. Where
+    /// scene files lie does not matter, and one that could not be read may have been mended.
+    pub fn difference(&self, before: &Self) -> Option<String> {
+        let policies = |plan: &Self| {
+            let name = |p: &PolicyPlan| format!("{} on the {} belief", p.policy, p.belief);
+            plan.policies.iter().map(name).collect::<Vec<_>>().join(", ")
+        };
+        let shard = |plan: &Self| plan.shard.map_or("no shard".to_owned(), |shard| format!("shard {shard}"));
+        let settings: [(&str, String, String); 7] = [
+            ("version", before.version.clone(), self.version.clone()),
+            ("budget", before.budget.to_string(), self.budget.to_string()),
+            ("number of seeds", before.seeds.to_string(), self.seeds.to_string()),
+            ("view array", before.views.clone(), self.views.clone()),
+            ("number of push candidates", before.planner.candidates.to_string(), self.planner.candidates.to_string()),
+            ("policies", policies(before), policies(self)),
+            ("shard", shard(before), shard(self)),
+        ];
+        let differs = settings.into_iter().find(|(_, before, now)| before != now);
+        if let Some((what, before, now)) = differs {
+            return Some(format!("the {what} was {before}, now it is {now}"));
+        }
+        self.scene_difference(before)
+    }
+
+    fn scene_difference(&self, before: &Self) -> Option<String> {
+        let names = |plan: &Self| plan.sets.iter().map(|set| set.name.clone()).collect::<Vec<_>>();
+        if names(self) != names(before) {
+            return Some(format!(
+                "the sets were {}, now they are {}",
+                names(before).join(", "),
+                names(self).join(", ")
+            ));
+        }
+        for (now, then) in self.sets.iter().zip(&before.sets) {
+            let was_broken = |id: &str| before.broken.iter().any(|b| b.set == now.name && b.id == id);
+            for scene in &now.scenes {
+                match then.scenes.iter().find(|other| other.id == scene.id) {
+                    Some(other) if other.scene == scene.scene => {}
+                    Some(_) => return Some(format!("scene {}/{} is another one", now.name, scene.id)),
+                    None if was_broken(&scene.id) => {}
+                    None => return Some(format!("scene {}/{} was not there", now.name, scene.id)),
+                }
+            }
+            let gone = then.scenes.iter().find(|scene| now.scenes.iter().all(|other| other.id != scene.id));
+            if let Some(scene) = gone {
+                return Some(format!("scene {}/{} is gone", now.name, scene.id));
+            }
+        }
+        None
+    }
+}
+
+/// Reads sets of scenes: each a folder of scene files, or a single scene file that makes a set of its own.
+///
+/// # Errors
+/// For a folder without scene files, a path that is not there, two sets of one name, and when no scene at all can be
+/// read. Single files that cannot be read come back as broken.
+pub fn load_sets(paths: &[PathBuf], catalog: &Catalog) -> Result<(Vec<SetPlan>, Vec<BrokenScene>)> {
+    let (mut sets, mut broken) = (Vec::new(), Vec::new());
+    let mut names = BTreeSet::new();
+    for path in paths {
+        let (name, files) = scene_files(path)?;
+        if !names.insert(name.clone()) {
+            return Err(Error::input(
+                path,
+                "",
+                format!("another set is called {name}, too: rename one of the folders"),
+            ));
+        }
+        let mut scenes = Vec::new();
+        for file in files {
+            let id = stem(&file);
+            match Scene::load(&file, catalog) {
+                Ok((scene, _)) => scenes.push(ScenePlan { id, file: file.display().to_string(), scene }),
+                Err(error) => broken.push(BrokenScene { set: name.clone(), id, error: error.to_string() }),
+            }
+        }
+        sets.push(SetPlan { name, scenes });
+    }
+    if sets.iter().all(|set| set.scenes.is_empty()) {
+        let first = broken.first().map_or("no set was named", |broken| &broken.error);
+        return Err(Error::Usage(format!("no scene can be read: {first}")));
+    }
+    Ok((sets, broken))
+}
+
+fn stem(file: &Path) -> String {
+    file.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Name and files of a set.
+fn scene_files(path: &Path) -> Result<(String, Vec<PathBuf>)> {
+    if path.is_file() {
+        return Ok((stem(path), vec![path.to_owned()]));
+    }
+    // The real path has the name of a folder that was typed as `.` or `scenes/..`.
+    let real = path.canonicalize().map_err(|error| Error::io(path, error))?;
+    let name = real.file_name().map_or("scenes".to_owned(), |name| name.to_string_lossy().into_owned());
+    let is_scene = |name: &String| name.ends_with(".toml") && !name.starts_with('.');
+    let files: Vec<PathBuf> =
+        names_in(path)?.iter().filter(|name| is_scene(name)).map(|name| path.join(name)).collect();
+    if files.is_empty() {
+        return Err(Error::input(path, "", "holds no scene files (*.toml): the set is empty"));
+    }
+    Ok((name, files))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plan(shard: Option<Shard>) -> Plan {
+        let scene = |id: &str| ScenePlan {
+            id: id.to_owned(),
+            file: format!("{id}.toml"),
+            scene: Scene {
+                name: id.to_owned(),
+                description: String::new(),
+                shelf: nudge_core::scene::Shelf::new([0.8, 0.4, 0.4]),
+                objects: Vec::new(),
+                meshes: std::collections::BTreeMap::new(),
+            },
+        };
+        let policy = |policy| PolicyPlan { policy, belief: "classical".to_owned() };
+        Plan {
+            format: FORMAT,
+            version: "1".to_owned(),
+            budget: 20,
+            seeds: 3,
+            views: "standard300".to_owned(),
+            planner: PlannerSettings::default(),
+            policies: vec![policy(PolicyKind::Mem), policy(PolicyKind::Oracle)],
+            sets: vec![SetPlan { name: "a".to_owned(), scenes: vec![scene("x"), scene("y")] }],
+            broken: Vec::new(),
+            shard,
+        }
+    }
+
+    #[test]
+    fn policies_without_dice_run_once() {
+        let episodes = plan(None).episodes();
+        assert_eq!(episodes.len(), 2 * (3 + 1));
+        assert!(episodes[..4].iter().all(|episode| episode.seed == 0), "seed 0 of everything comes first");
+    }
+
+    #[test]
+    fn shards_share_all_episodes_and_none_twice() {
+        let mut all: Vec<EpisodeId> =
+            (0..3).flat_map(|index| plan(Some(Shard { index, count: 3 })).episodes()).collect();
+        all.sort();
+        let mut expected = plan(None).episodes();
+        expected.sort();
+        assert_eq!(all, expected);
+    }
+
+    #[test]
+    fn a_shard_is_read_from_its_own_words() {
+        assert_eq!("2/3".parse(), Ok(Shard { index: 2, count: 3 }));
+        for wrong in ["3/3", "1", "a/b", "-1/2", "0/0"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_differs_is_named() {
+        let before = plan(None);
+        assert_eq!(before.difference(&before), None);
+        let mut moved = before.clone();
+        moved.sets[0].scenes[0].file = "elsewhere/x.toml".to_owned();
+        assert_eq!(moved.difference(&before), None);
+        let mut other = before.clone();
+        other.budget = 40;
+        assert_eq!(other.difference(&before).as_deref(), Some("the budget was 20, now it is 40"));
+        let mut fewer = before.clone();
+        let gone = fewer.sets[0].scenes.remove(1);
+        assert_eq!(fewer.difference(&before).as_deref(), Some("scene a/y is gone"));
+        assert_eq!(before.difference(&fewer).as_deref(), Some("scene a/y was not there"));
+        fewer.broken.push(BrokenScene { set: "a".to_owned(), id: gone.id, error: "torn".to_owned() });
+        assert_eq!(before.difference(&fewer), None, "a mended scene may join");
+    }
+}

@@ -1,0 +1,200 @@
+//! What a bench keeps of an episode.
+
+use super::plan::{EpisodeId, Plan};
+use nudge_core::episode::{EpisodeRecord, StepRecord, StepSeconds};
+use nudge_core::plan::{Action, PolicyKind, Reason};
+use nudge_core::score::{ObjectVerdict, Scores, Tally, Verdict};
+use serde::{Deserialize, Serialize};
+
+/// The format number of results.
+pub const FORMAT: u32 = 1;
+
+/// An episode's result: everything that reports are made of, and nothing that depends on the clock.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeResult {
+    /// Format number.
+    pub format: u32,
+    /// Version of the program that ran it.
+    pub version: String,
+    /// Name of its set.
+    pub set: String,
+    /// Its scene's name in the set.
+    pub scene: String,
+    /// The policy.
+    pub policy: PolicyKind,
+    /// Name of the belief update.
+    pub belief: String,
+    /// The seed.
+    pub seed: u64,
+    /// Number of actions.
+    pub budget: usize,
+    /// Number of objects in the scene.
+    pub objects: usize,
+    /// Objects that no view of the array shows at the start.
+    pub hidden: Vec<u16>,
+    /// Scores of the prior.
+    pub prior: Scores,
+    /// The steps.
+    pub steps: Vec<StepResult>,
+    /// What became of the objects in the end.
+    pub verdicts: Vec<ObjectVerdict>,
+    /// The counts behind the scores after half of the budget and at the end, by number of actions.
+    pub tallies: Vec<(usize, Tally)>,
+}
+
+/// One step of a result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepResult {
+    /// What was done.
+    pub action: Action,
+    /// Why.
+    pub reason: Reason,
+    /// Gain of the best pair of views, nats.
+    pub igv: f32,
+    /// Gain of the best push, nats.
+    pub igm: f32,
+    /// Disturbance of the best push, nats.
+    pub reg: f32,
+    /// Gain that the view which was looked from had promised, nats; `None` for a push.
+    pub gain: Option<f32>,
+    /// Scores after the step.
+    pub scores: Scores,
+    /// How many objects had which verdict.
+    pub verdicts: VerdictCounts,
+    /// Objects that the step dropped.
+    pub dropped: Vec<String>,
+    /// Sum of object displacements, metres.
+    pub displacement_m: f64,
+}
+
+/// How many objects have which verdict.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct VerdictCounts {
+    /// Found.
+    pub found: usize,
+    /// Taken for another class.
+    pub misclassified: usize,
+    /// Not found.
+    pub not_found: usize,
+    /// Made up.
+    pub hallucinated: usize,
+}
+
+impl VerdictCounts {
+    /// Counts verdicts.
+    pub fn of(verdicts: &[ObjectVerdict]) -> Self {
+        let count = |verdict: Verdict| verdicts.iter().filter(|v| v.verdict == verdict).count();
+        Self {
+            found: count(Verdict::Found),
+            misclassified: count(Verdict::Misclassified),
+            not_found: count(Verdict::NotFound),
+            hallucinated: count(Verdict::Hallucinated),
+        }
+    }
+}
+
+/// Where the time of an episode went.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeSeconds {
+    /// Threads that the episode had.
+    pub threads: usize,
+    /// Wall-clock seconds from its start to its end.
+    pub total: f64,
+    /// By step.
+    pub steps: Vec<StepSeconds>,
+}
+
+/// The number of actions after which tallies are kept.
+pub fn tallied_steps(budget: usize) -> [usize; 2] {
+    [budget.div_ceil(2), budget]
+}
+
+impl EpisodeResult {
+    /// The result of a finished episode.
+    pub fn new(
+        plan: &Plan,
+        id: EpisodeId,
+        record: &EpisodeRecord,
+        hidden: Vec<u16>,
+        tallies: Vec<(usize, Tally)>,
+    ) -> Self {
+        let set = &plan.sets[id.set];
+        Self {
+            format: FORMAT,
+            version: record.version.clone(),
+            set: set.name.clone(),
+            scene: set.scenes[id.scene].id.clone(),
+            policy: record.config.policy,
+            belief: record.config.belief.clone(),
+            seed: record.config.seed,
+            budget: record.config.budget,
+            objects: record.scene.objects.len(),
+            hidden,
+            prior: record.prior,
+            steps: record.steps.iter().map(StepResult::new).collect(),
+            verdicts: record.steps.last().map(|step| step.objects.clone()).unwrap_or_default(),
+            tallies,
+        }
+    }
+
+    /// Whether this is the result of an episode of a plan, whole and of the same program.
+    pub fn belongs_to(&self, plan: &Plan, id: EpisodeId) -> bool {
+        let (set, policy) = (&plan.sets[id.set], &plan.policies[id.policy]);
+        (self.format, &self.version) == (FORMAT, &plan.version)
+            && (&self.set, &self.scene) == (&set.name, &set.scenes[id.scene].id)
+            && (self.policy, &self.belief, self.seed) == (policy.policy, &policy.belief, id.seed)
+            && (self.budget, self.steps.len()) == (plan.budget, plan.budget)
+    }
+
+    /// Scores after a number of actions; 0 is the prior.
+    pub fn scores(&self, actions: usize) -> &Scores {
+        actions.checked_sub(1).and_then(|at| self.steps.get(at)).map_or(&self.prior, |step| &step.scores)
+    }
+
+    /// A score over the steps, the prior first.
+    pub fn curve(&self, score: impl Fn(&Scores) -> f64) -> Vec<f64> {
+        (0..=self.steps.len()).map(|actions| score(self.scores(actions))).collect()
+    }
+
+    /// Number of pushes.
+    pub fn pushes(&self) -> usize {
+        self.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).count()
+    }
+
+    /// Number of pushes that dropped something.
+    pub fn drops(&self) -> usize {
+        self.steps.iter().filter(|step| !step.dropped.is_empty()).count()
+    }
+
+    /// Sum of all displacements, metres.
+    pub fn displacement_m(&self) -> f64 {
+        self.steps.iter().map(|step| step.displacement_m).sum()
+    }
+
+    /// How many of the objects that were hidden at the start were found in the end.
+    pub fn revealed(&self) -> usize {
+        let found = |id: &&u16| self.verdicts.iter().any(|v| v.object == Some(**id) && v.verdict == Verdict::Found);
+        self.hidden.iter().filter(found).count()
+    }
+}
+
+impl StepResult {
+    fn new(step: &StepRecord) -> Self {
+        let gain = match step.action {
+            Action::Look { view } => step.decision.gains.get(usize::from(view.0)).copied(),
+            Action::Push(_) => None,
+        };
+        Self {
+            action: step.action,
+            reason: step.decision.reason,
+            igv: step.decision.igv,
+            igm: step.decision.igm,
+            reg: step.decision.reg,
+            gain,
+            scores: step.scores,
+            verdicts: VerdictCounts::of(&step.objects),
+            dropped: step.dropped.clone(),
+            displacement_m: step.displacement_m,
+        }
+    }
+}

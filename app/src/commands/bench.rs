@@ -1,0 +1,325 @@
+//! `nudge bench`: every policy on every scene of some sets, and the shards of that put together again.
+
+use super::{print, to_json, warn};
+use crate::bench::{
+    BenchDir, BrokenScene, EpisodeId, EpisodeResult, Event, Plan, PolicyPlan, Shard, SummaryRow, Workers, load_sets,
+    merge, run as work, summarise,
+};
+use crate::driver::belief_update;
+use indicatif::{ProgressBar, ProgressStyle};
+use nudge_core::Error;
+use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::scene::Catalog;
+use std::collections::BTreeMap;
+use std::io::IsTerminal;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Run every policy on every scene of some sets; the same command goes on after a kill.
+#[derive(clap::Args, Debug)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct Args {
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+#[derive(clap::Subcommand, Debug)]
+enum Command {
+    Merge(MergeArgs),
+}
+
+/// Put the shards of a bench together, as if one process had run all of it
+#[derive(clap::Args, Debug)]
+struct MergeArgs {
+    /// The directories of all shards
+    #[arg(required = true, value_name = "DIR")]
+    parts: Vec<PathBuf>,
+    /// The directory to make
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(clap::Args, Debug)]
+struct RunArgs {
+    /// Sets of scenes: folders of scene files, or single files
+    #[arg(required = true, value_name = "SET")]
+    sets: Vec<PathBuf>,
+    /// Policies, or `all`
+    #[arg(long, default_value = "all", value_delimiter = ',', value_name = "A,B")]
+    policies: Vec<String>,
+    /// Number of seeds; policies that draw nothing at random run once
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// Number of actions of an episode
+    #[arg(long, default_value_t = 20, value_name = "B")]
+    budget: usize,
+    /// How beliefs are updated: cnabu or classical (default: what each policy is published with)
+    #[arg(long)]
+    belief: Option<String>,
+    /// The view array: standard300, real75, or a file
+    #[arg(long, default_value = "standard300")]
+    views: String,
+    /// Push candidates drawn per decision
+    #[arg(long, default_value_t = PlannerSettings::default().candidates)]
+    candidates: usize,
+    /// The bench's directory
+    #[arg(long, required = true, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Run the i-th of every n episodes only, i from 0; `nudge bench merge` puts the directories together
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Episodes at once [default: as many as processors and memory allow]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    jobs: Option<u16>,
+    /// Keep every episode whole, with beliefs and recording (about 100 MB each)
+    #[arg(long)]
+    record: bool,
+    /// Print the summary as JSON, and nothing on the way
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    match &args.command {
+        None => run_bench(&args.run),
+        Some(Command::Merge(args)) => {
+            let plan = merge(&args.parts, &args.out)?;
+            let (directory, _) = BenchDir::open(&args.out)?;
+            let results = results(&directory, &plan, &plan.episodes())?;
+            print(&table(&summarise(&results)))
+        }
+    }
+}
+
+fn run_bench(args: &RunArgs) -> anyhow::Result<()> {
+    let plan = plan(args)?;
+    for BrokenScene { error, .. } in &plan.broken {
+        warn(&format!("left out: {error}"));
+    }
+    let out = args.out.as_deref().unwrap_or(std::path::Path::new("."));
+    let directory = BenchDir::prepare(out, &plan)?;
+    let (all, missing) = (plan.episodes(), directory.missing(&plan)?);
+    let workers = workers(args.jobs, missing.len());
+    let mut progress = Progress::new(&plan, all.len(), missing.len(), workers, args.json);
+    let mut failed = Vec::new();
+    work(&plan, &directory, &missing, workers, args.record, &mut |event| match event {
+        Event::Done { id, result, seconds } => progress.done(id, &result, seconds),
+        Event::Failed { error, .. } => failed.push(error),
+    })?;
+    progress.finish();
+    if let Some(error) = failed.pop() {
+        failed.iter().for_each(|error| eprintln!("{error}"));
+        return Err(error.into());
+    }
+    let summary = summarise(&results(&directory, &plan, &all)?);
+    if args.json {
+        let broken: Vec<&str> = plan.broken.iter().map(|broken| broken.error.as_str()).collect();
+        let document = serde_json::json!({ "episodes": all.len(), "summary": summary, "broken": broken });
+        print(&to_json(&document)?)?;
+    } else {
+        print(&table(&summary))?;
+    }
+    match &plan.broken[..] {
+        [] => Ok(()),
+        [first, ..] => {
+            let count = plan.broken.len();
+            let message = format!("{count} of the scenes could not be read, the rest ran; first {}", first.error);
+            Err(Error::Usage(message).into())
+        }
+    }
+}
+
+fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
+    let policies = policies(args)?;
+    if args.budget == 0 {
+        return Err(Error::Usage("--budget must be at least one action".to_owned()).into());
+    }
+    let (sets, broken) = load_sets(&args.sets, &Catalog::standard())?;
+    nudge_core::camera::ViewArray::named(&args.views)?;
+    Ok(Plan {
+        format: crate::bench::FORMAT,
+        version: nudge_core::VERSION.to_owned(),
+        budget: args.budget,
+        seeds: args.seeds,
+        views: args.views.clone(),
+        planner: PlannerSettings { candidates: args.candidates, ..PlannerSettings::default() },
+        policies,
+        sets,
+        broken,
+        shard: args.shard,
+    })
+}
+
+fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
+    let mut kinds: Vec<PolicyKind> = Vec::new();
+    for name in &args.policies {
+        let named = if name == "all" { PolicyKind::ALL.to_vec() } else { vec![name.parse()?] };
+        for kind in named {
+            if !kinds.contains(&kind) {
+                kinds.push(kind);
+            }
+        }
+    }
+    let mut notes: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+    let mut policies = Vec::new();
+    for policy in kinds {
+        let (update, note) = belief_update(args.belief.as_deref(), policy)?;
+        if let Some(note) = note {
+            // The same words for every policy are said once.
+            notes.entry(note.replace(policy.name(), "POLICY")).or_default().push(policy.name());
+        }
+        policies.push(PolicyPlan { policy, belief: update.name().to_owned() });
+    }
+    for (note, names) in notes {
+        warn(
+            &note
+                .replace("POLICY", &names.join(", "))
+                .replace(" runs on ", if names.len() > 1 { " run on " } else { " runs on " }),
+        );
+    }
+    Ok(policies)
+}
+
+fn results(directory: &BenchDir, plan: &Plan, episodes: &[EpisodeId]) -> nudge_core::Result<Vec<EpisodeResult>> {
+    let mut results = Vec::with_capacity(episodes.len());
+    for id in episodes {
+        results.extend(directory.result(plan, *id)?);
+    }
+    Ok(results)
+}
+
+/// The workers for a number of episodes: as many as were asked for, or as processors (or `RAYON_NUM_THREADS`) and memory
+/// allow.
+pub(super) fn workers(jobs: Option<u16>, episodes: usize) -> Workers {
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse().ok()).filter(|n| *n > 0);
+    let processors = asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+    Workers::new(jobs.map(usize::from), processors, available_memory(), episodes)
+}
+
+/// Memory that is free to use, bytes; `None` where the system does not say.
+fn available_memory() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/meminfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("MemAvailable:"))?;
+    let kilobytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(kilobytes << 10)
+}
+
+fn table(rows: &[SummaryRow]) -> String {
+    let mut text = format!(
+        "\n{:<12} {:<20} {:>8}  {:>6}  {:>6}  {:>8}  {:>8}  {:>6}\n",
+        "set", "policy", "episodes", "IoU", "mIoU", "H nats", "revealed", "pushes"
+    );
+    for row in rows {
+        let revealed = row.revealed.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
+        text += &format!(
+            "{:<12} {:<20} {:>8}  {:>6.3}  {:>6.3}  {:>8.0}  {revealed:>8}  {:>6.1}\n",
+            row.set, row.policy, row.episodes, row.occupancy_iou, row.semantic_miou, row.entropy_nats, row.pushes
+        );
+    }
+    text
+}
+
+/// Tells how far a bench has come: a bar on a terminal, a line per episode in a log.
+struct Progress<'a> {
+    plan: &'a Plan,
+    bar: ProgressBar,
+    quiet: bool,
+    all: usize,
+    missing: usize,
+    done: usize,
+    jobs: usize,
+    started: Instant,
+    /// Sum of seconds and number of finished episodes, and number of those to come, by policy.
+    spent: Vec<(f64, usize, usize)>,
+}
+
+impl<'a> Progress<'a> {
+    fn new(plan: &'a Plan, all: usize, missing: usize, workers: Workers, quiet: bool) -> Self {
+        let mut spent = vec![(0.0, 0, 0); plan.policies.len()];
+        let bar =
+            if std::io::stderr().is_terminal() { ProgressBar::new(missing as u64) } else { ProgressBar::hidden() };
+        let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {msg}").expect("a constant template");
+        if !quiet {
+            let Workers { jobs, threads } = workers;
+            println!(
+                "{missing} of {all} episodes to run, {jobs} at once on {threads} {} each",
+                if threads == 1 { "thread" } else { "threads" }
+            );
+        }
+        // What is to come is counted down as it is done; shares of policies are those of the whole plan.
+        for id in plan.episodes() {
+            spent[id.policy].2 += 1;
+        }
+        Self {
+            plan,
+            bar: bar.with_style(style),
+            quiet,
+            all,
+            missing,
+            done: 0,
+            jobs: workers.jobs,
+            started: Instant::now(),
+            spent,
+        }
+    }
+
+    fn done(&mut self, id: EpisodeId, result: &EpisodeResult, seconds: f64) {
+        self.done += 1;
+        let (sum, count, to_come) = &mut self.spent[id.policy];
+        (*sum, *count, *to_come) = (*sum + seconds, *count + 1, to_come.saturating_sub(1));
+        let left = self.left();
+        self.bar.set_position(self.done as u64);
+        self.bar.set_message(format!("about {left} left"));
+        if self.quiet {
+            return;
+        }
+        let last = result.scores(result.steps.len());
+        let line = format!(
+            "{:>5}/{}  {:<48}  IoU {:.3}  mIoU {:.3}  {seconds:>6.1} s, about {left} left",
+            self.all - self.missing + self.done,
+            self.all,
+            self.plan.name(id),
+            last.occupancy_iou,
+            last.semantic_miou
+        );
+        self.bar.suspend(|| println!("{line}"));
+    }
+
+    /// Time left, from what episodes of each policy have taken so far.
+    fn left(&self) -> String {
+        let (sum, count) = self.spent.iter().fold((0.0, 0), |(sum, count), (s, c, _)| (sum + s, count + c));
+        let overall = sum / f64::max(1.0, count as f64);
+        let to_come: usize = self.spent.iter().map(|(_, _, to_come)| to_come).sum();
+        let seconds: f64 = self
+            .spent
+            .iter()
+            .map(|(sum, count, to_come)| {
+                let each = if *count > 0 { sum / *count as f64 } else { overall };
+                each * *to_come as f64
+            })
+            .sum();
+        // Of a plan that is being gone on with, only what is missing.
+        let share = (self.missing - self.done) as f64 / to_come.max(1) as f64;
+        words(Duration::from_secs_f64(seconds * share / self.jobs as f64))
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+        if !self.quiet && self.done > 0 {
+            println!("{} episodes in {}", self.done, words(self.started.elapsed()));
+        }
+    }
+}
+
+/// A time in words: `3 h 12 min`, `5 min`, `40 s`.
+fn words(time: Duration) -> String {
+    let seconds = time.as_secs();
+    match seconds {
+        0..60 => format!("{seconds} s"),
+        60..3600 => format!("{} min", (seconds + 30) / 60),
+        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
+    }
+}

@@ -1,0 +1,74 @@
+//! The arm: its links, the way of its tip, and the views that its hand can be at.
+
+use super::shapes::{self, REJECTED_RGB};
+use crate::colors::Rgb;
+use nudge_core::arm::{ArmTool, Joints, Motion, Part, Role, pose_of};
+use nudge_core::camera::{ViewArray, ViewId};
+use nudge_core::plan::Decision;
+
+const LINK_RGB: Rgb = [150, 164, 180];
+const TOOL_RGB: Rgb = [72, 74, 80];
+const REACHED_RGB: Rgb = [86, 196, 132];
+const PATH_RGB: Rgb = [120, 200, 255];
+/// Time between two poses of a motion, seconds, for motions that are not long.
+const FRAME_S: f64 = 0.1;
+/// Most poses of a motion.
+const MOST_FRAMES: usize = 60;
+
+/// A body of the arm in its own frame; `None` for one without shapes.
+pub fn body(parts: &[Part]) -> Option<rerun::Mesh3D> {
+    let convex: Vec<_> = parts.iter().map(|part| part.shape.clone()).collect();
+    let tool = parts.iter().any(|part| part.role == Role::Tool);
+    let [r, g, b] = if tool { TOOL_RGB } else { LINK_RGB };
+    (!convex.is_empty())
+        .then(|| shapes::mesh(&convex).with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(r, g, b, 255)))
+}
+
+/// The transforms of all bodies in a configuration.
+pub fn transforms(arm: &ArmTool, joints: &Joints) -> Vec<rerun::Transform3D> {
+    arm.arm.body_poses(joints).iter().map(|pose| shapes::transform(&pose_of(pose))).collect()
+}
+
+/// The poses of a motion that are recorded: seconds since it began, and the configuration.
+pub fn frames(motion: &Motion) -> Vec<(f64, Joints)> {
+    let end = motion.duration_s();
+    let count = ((end / FRAME_S).ceil() as usize).clamp(1, MOST_FRAMES);
+    let at = |i: usize| end * i as f64 / count as f64;
+    (0..=count).filter_map(|i| Some((at(i), motion.at(at(i))?))).collect()
+}
+
+/// When in a step's motion the arm is at the end of its push, seconds; the motion's end where it does not push.
+pub fn shown_at_s(arm: &ArmTool, motion: &Motion, decision: &Decision, pushes: bool) -> f64 {
+    let back = match (&decision.motion, pushes) {
+        (Some(push), true) => push.way_back(&arm.arm).duration_s(),
+        _ => 0.0,
+    };
+    motion.duration_s() - back
+}
+
+/// The way of the tip.
+pub fn path(arm: &ArmTool, motion: &Motion) -> rerun::LineStrips3D {
+    let tip = |(_, joints): (f64, Joints)| -> [f32; 3] {
+        arm.arm.world_from_tool(&joints).translation.vector.map(|v| v as f32).into()
+    };
+    let stops = motion.stops.iter().map(|stop| (stop.at_s, stop.joints));
+    // Between stops the joints move straight, the tip does not.
+    let mut fine: Vec<(f64, Joints)> = frames(motion).into_iter().chain(stops).collect();
+    fine.sort_by(|a, b| a.0.total_cmp(&b.0));
+    rerun::LineStrips3D::new([fine.into_iter().map(tip).collect::<Vec<_>>()])
+        .with_colors([rerun::Color::from(PATH_RGB)])
+        .with_radii([rerun::Radius::new_ui_points(1.8)])
+}
+
+/// Where the cameras of all views are: green where the hand can be, grey where it cannot.
+pub fn reachable(array: &ViewArray, unreachable: &[ViewId]) -> rerun::Points3D {
+    let reached = |id: &ViewId| !unreachable.contains(id);
+    rerun::Points3D::new(array.views.iter().map(|view| <[f32; 3]>::from(view.position().coords)))
+        .with_colors(
+            array
+                .views
+                .iter()
+                .map(|view| rerun::Color::from(if reached(&view.id) { REACHED_RGB } else { REJECTED_RGB })),
+        )
+        .with_radii(array.views.iter().map(|view| if reached(&view.id) { 0.005_f32 } else { 0.003 }))
+}

@@ -1,0 +1,82 @@
+//! The scenes that went worst and best, with pictures and the way back to their episodes.
+
+use super::results::{Finished, Metric, Results};
+use super::tables::reference;
+use crate::figure::{RasterStyle, Svg, escape};
+use crate::picture::{self, View};
+use nudge_core::Result;
+use nudge_core::scene::Catalog;
+use std::path::Path;
+
+/// How many scenes of each end are shown.
+const SHOWN: usize = 3;
+/// Width of a picture, pixels.
+const WIDTH: u32 = 360;
+
+/// The worst and the best scenes of a set for the reference policy. `bench_from_page` leads from the page to the bench's
+/// directory.
+pub fn extremes(results: &Results, set: usize, catalog: &Catalog, bench_from_page: &Path) -> Result<String> {
+    let at = reference(results);
+    let Some(cell) = results.cell(set, at) else { return Ok(String::new()) };
+    let policy = results.plan.policies[at].policy;
+    let budget = results.plan.budget;
+    let value = |finished: &Finished| Metric::SemanticMiou.of(finished.result.scores(budget));
+    let mut order: Vec<(usize, f64)> =
+        cell.by_scene(|result| Metric::SemanticMiou.of(result.scores(budget))).into_iter().collect();
+    order.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let worst = order.len().min(SHOWN);
+    let best = (order.len() - worst).min(SHOWN);
+    let mut html = String::new();
+    let parts = [("Worst", &order[..worst]), ("Best", &order[order.len() - best..])];
+    for (title, scenes) in parts.into_iter().filter(|(_, scenes)| !scenes.is_empty()) {
+        html += &format!("<h3>{title} scenes for {policy}, by semantic mIoU at the end</h3>\n<div class=\"cards\">\n");
+        for (scene, mean) in scenes {
+            let plan = &results.plan.sets[set].scenes[*scene];
+            let picture = picture::thumbnail(&plan.scene, catalog, View::Above, WIDTH)?;
+            let size = [picture.width() as f32, picture.height() as f32];
+            let mut svg = Svg::new(size);
+            svg.raster([0.0, 0.0], size, &picture, RasterStyle::Smooth);
+            html += &format!(
+                "<section class=\"card\">{}<h4>{}</h4><p>{}</p><p>mIoU {mean:.3}</p><ul>",
+                svg.document(),
+                escape(&plan.id),
+                escape(&plan.scene.description)
+            );
+            for finished in &cell.scenes[scene] {
+                html += &format!("<li>seed {}: mIoU {:.3}, ", finished.id.seed, value(finished));
+                html += &way_back(results, finished, &plan.file, bench_from_page);
+                html += "</li>";
+            }
+            html += "</ul></section>\n";
+        }
+        html += "</div>\n";
+    }
+    Ok(html)
+}
+
+/// A link to the recording, or the command that makes it again.
+fn way_back(results: &Results, finished: &Finished, file: &str, bench_from_page: &Path) -> String {
+    if let Some(recording) = &finished.recording {
+        let path = bench_from_page.join(recording);
+        let link = |name: &str| escape(&path.join(name).to_string_lossy().replace(' ', "%20"));
+        return format!(
+            "<a href=\"{}\">summary</a>, <a href=\"{}\">recording</a>",
+            link(crate::driver::SUMMARY),
+            link(crate::driver::RECORDING)
+        );
+    }
+    let result = &finished.result;
+    let views = match results.plan.views.as_str() {
+        "standard300" => String::new(),
+        other => format!(" --views {other}"),
+    };
+    format!(
+        "<code>nudge run {} --policy {} --belief {} --seed {} --budget {}{}</code>",
+        escape(file),
+        result.policy,
+        escape(&result.belief),
+        result.seed,
+        result.budget,
+        escape(&views)
+    )
+}

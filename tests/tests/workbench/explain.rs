@@ -1,0 +1,91 @@
+//! Asking why, gains of views, what a push would do and did.
+
+use super::window::Window;
+use egui_kittest::kittest::Queryable;
+use nudge::workbench::command::Command;
+use nudge::workbench::model::{Hovered, LayoutKind, Picked};
+use nudge_core::camera::ViewId;
+use nudge_core::plan::Action;
+use rerun::external::egui::{Key, Modifiers};
+
+#[test]
+fn a_cell_and_a_voxel_are_asked_about_by_pointer_and_by_key() {
+    let mut window = Window::with_episode(2);
+    window.click("Run");
+    window.click("Map of semantics");
+    let Some(Picked::Cell(cell)) = window.model().picked else { panic!("{:?}", window.model().picked) };
+    assert_eq!(window.model().kept.layout, LayoutKind::Why);
+    assert!(window.sees("Floor cell at") && window.sees("vacuity") && window.sees("What changed it"));
+    // The arrow keys walk over the map that has the focus.
+    window.harness.get_by_label("Map of semantics").focus();
+    window.harness.run_steps(2);
+    window.key(Modifiers::NONE, Key::ArrowUp);
+    assert_eq!(window.model().picked, Some(Picked::Cell(cell + 1)));
+    window.click("Probability of occupancy up the column");
+    assert!(matches!(window.model().picked, Some(Picked::Voxel(_))), "{:?}", window.model().picked);
+    for words in ["Beta", "variance", "entropy", "truth", "Over the steps", "Class of the floor cell"] {
+        assert!(window.sees(words), "{words}");
+    }
+    window.click("Its floor cell");
+    assert_eq!(window.model().picked, Some(Picked::Cell(cell + 1)));
+    // History and causes lead to their steps.
+    window.key(Modifiers::NONE, Key::Home);
+    assert_eq!(window.model().cursor, 0);
+    if window.sees("step 1: ") {
+        window.click_first("step 1: ");
+        assert_eq!(window.model().cursor, 1);
+    }
+}
+
+#[test]
+fn a_views_gain_is_explained_and_follows_the_clock() {
+    let mut window = Window::with_episode(2);
+    window.click("Run");
+    window.layout(LayoutKind::Gains);
+    window.click("Step 1");
+    window.click("Gain of the views at target 2");
+    let view = window.model().view.expect("a view");
+    let source = window.model().gain_source.clone().expect("where its gain comes from");
+    assert_eq!((source.view, source.of.1), (view, 1));
+    let sum: f32 = source.nats.iter().map(|(_, nats)| nats).sum();
+    let gain = window.session().record.steps[1].decision.gains[usize::from(view.0)];
+    assert!((sum - gain).abs() <= 0.02 * gain.max(1.0), "the voxels' nats sum to the view's gain: {sum}, {gain}");
+    assert!(window.sees("By height") && window.sees("from all voxels, nats"));
+    window.click("Step 0");
+    assert_eq!(window.model().gain_source.as_ref().map(|source| (source.of.1, source.view)), Some((0, view)));
+    window.harness.get_by_label("Gain of the views at target 2").focus();
+    window.harness.run_steps(2);
+    window.key(Modifiers::NONE, Key::ArrowLeft);
+    assert_ne!(window.model().view, Some(view));
+}
+
+#[test]
+fn a_push_is_previewed_done_and_reviewed() {
+    let mut window = Window::with_pushes(8);
+    // Something has to be seen, three times over, before it is sure enough to be pushed.
+    for view in [133, 136, 163, 166] {
+        window.app().ask(Command::DoInstead(Action::Look { view: ViewId(view) }));
+        window.wait();
+    }
+    window.click("Decide");
+    let decision = window.session().pending.clone().expect("a decision");
+    let feasible = decision.candidates.iter().filter(|candidate| candidate.rejection.is_none()).count();
+    assert!((1..=12).contains(&feasible), "as many as the form says at most: {feasible}");
+    let feasible = decision.candidates.iter().position(|candidate| candidate.rejection.is_none()).expect("feasible");
+    window.layout(LayoutKind::Push);
+    window.hover_first(&format!("Push {feasible}, value"));
+    assert_eq!(window.model().hovered, Hovered::Push(decision.candidates[feasible].push));
+    window.click_first(&format!("Push {feasible}, value"));
+    let preview = window.model().preview.clone().expect("a prediction");
+    assert_eq!((preview.of.1, preview.push), (4, decision.candidates[feasible].push));
+    assert!(!preview.swept.is_empty());
+    for map in ["Map of the push: now", "Map of the push: predicted", "Map of the push: change"] {
+        assert!(window.sees(map), "{map}");
+    }
+    window.click("Push this");
+    assert_eq!(window.session().record.steps[4].action, Action::Push(decision.candidates[feasible].push));
+    // One step back, the same push shows what happened beside what was predicted.
+    window.click("Step 4");
+    window.click_first(&format!("Push {feasible}, value"));
+    assert!(window.sees("Map of the push: what happened"));
+}

@@ -1,4 +1,4 @@
-# make demo · make workbench · make test · make regress · make bench · make lint — each sets up what it needs, once.
+# make demo · make workbench · make cnabu · make test · make regress · make bench · make lint — each sets up what it needs, once.
 # Everything is built with one profile (release), in CARGO_TARGET_DIR if that is set, else in target/.
 export CARGO_TARGET_DIR ?= $(CURDIR)/target
 NUDGE := $(CARGO_TARGET_DIR)/release/nudge
@@ -6,10 +6,18 @@ VENV  := $(CARGO_TARGET_DIR)/venv
 # The window with Rerun's viewer inside: about 1,000 crates. Without it the build is headless.
 WINDOW := --features nudge-tests/workbench
 
-.PHONY: help setup graphics python demo workbench test test-headless regress bench bench-window lint
+# With neural belief updates: needs libtorch, which scripts/libtorch.sh fetches unless LIBTORCH names one. The tests' own
+# crate stays out: a feature of `nudge` asked for by the whole workspace would bring the window along.
+NETWORKS := -p nudge-core -p nudge --features nudge/cnabu
+DATA := $(CURDIR)/out/data
+
+.PHONY: help setup graphics python demo workbench cnabu train train-push test test-cnabu test-headless regress bench bench-window lint lint-cnabu
 help:
 	@echo 'make demo        map a crowded shelf: prints the table, writes out/demo/'
 	@echo 'make workbench   build and open the window (the first build takes about 45 minutes on two cores)'
+	@echo 'make cnabu       build with neural belief updates (fetches libtorch, 540 MB, once)'
+	@echo 'make train       make data and train sigma_o; goes on where it was stopped (make train-push: sigma_m)'
+	@echo 'make test-cnabu  tests of the neural belief updates'
 	@echo 'make test        all tests, those of the window too (the first build takes about 45 minutes on two cores)'
 	@echo 'make test-headless  the tests that need no window'
 	@echo 'make regress     the scores of a small fixed bench against golden ones'
@@ -33,6 +41,29 @@ demo: setup
 workbench: graphics
 	cargo build --release --locked --workspace $(WINDOW)
 	$(NUDGE)
+
+cnabu: setup
+	LIBTORCH="$$(scripts/libtorch.sh)" cargo build --release --locked $(NETWORKS)
+
+train: cnabu
+	$(NUDGE) data maps --count 50 --seed 2 --noise 0 --out $(DATA)/maps/val
+	$(NUDGE) data maps --count 300 --seed 3 --noise 0 --out $(DATA)/maps/test
+	$(NUDGE) data maps --count 10000 --seed 1 --out $(DATA)/maps/train
+	$(NUDGE) train observe --data $(DATA)/maps/train --val $(DATA)/maps/val --out $(DATA)/sigma_o \
+		$$([ -e $(DATA)/sigma_o.safetensors ] && echo --resume) --patience 8
+	$(NUDGE) train export observe $(DATA)/sigma_o --data $(DATA)/maps/train --test $(DATA)/maps/test --out models
+
+train-push: cnabu
+	$(NUDGE) data pushes --count 50 --seed 2 --noise 0 --out $(DATA)/pushes/val
+	$(NUDGE) data pushes --count 300 --seed 3 --noise 0 --out $(DATA)/pushes/test
+	$(NUDGE) data pushes --count 6000 --seed 1 --out $(DATA)/pushes/train
+	$(NUDGE) train push --data $(DATA)/pushes/train --val $(DATA)/pushes/val --out $(DATA)/sigma_m \
+		$$([ -e $(DATA)/sigma_m.safetensors ] && echo --resume) --patience 8
+	$(NUDGE) train export push $(DATA)/sigma_m --data $(DATA)/pushes/train --test $(DATA)/pushes/test --out models
+
+test-cnabu: cnabu python
+	LIBTORCH="$$(scripts/libtorch.sh)" cargo test --release --locked $(NETWORKS) -- --include-ignored cnabu train
+	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked -p nudge-tests --features cnabu --test cnabu
 
 test: graphics python
 	cargo build --release --locked --workspace $(WINDOW)
@@ -61,3 +92,8 @@ lint: graphics
 	CLIPPY_ARGS='-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__' RUSTC_WORKSPACE_WRAPPER=clippy-driver \
 		cargo build --release --locked --workspace --all-targets $(WINDOW)
 	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps
+
+lint-cnabu: setup
+	CLIPPY_ARGS='-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__' RUSTC_WORKSPACE_WRAPPER=clippy-driver \
+		LIBTORCH="$$(scripts/libtorch.sh)" cargo build --release --locked $(NETWORKS) --all-targets
+	LIBTORCH="$$(scripts/libtorch.sh)" RUSTDOCFLAGS='-D warnings' cargo doc --release --locked $(NETWORKS) --no-deps

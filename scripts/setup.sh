@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs what a bare Debian lacks. `setup.sh build`: the C compiler that some crates need. `setup.sh graphics`: what
-# the window needs to build, and to draw without a display. `setup.sh python DIR`: a virtual environment with NumPy and
-# the stock Rerun tools, which the tests use to read what Nudge writes.
+# the window needs to build, and to draw without a display. `setup.sh python DIR`: a virtual environment with NumPy,
+# zstandard and the stock Rerun tools, which the tests use to read what Nudge writes.
 set -euo pipefail
 
 fail() { echo "setup: $*" >&2; exit 2; }
@@ -31,15 +31,16 @@ graphics)
     ;;
 python)
     venv=${2:?setup.sh python DIR}
-    [ -e "$venv/ready" ] && exit 0
+    [ -e "$venv/ready-2" ] && exit 0
     command -v python3 >/dev/null || apt_install python3
     python3 -c 'import ensurepip, venv' 2>/dev/null || apt_install python3-venv
     rm -rf "$venv"
     mkdir -p "$(dirname "$venv")"
     python3 -m venv "$venv"
-    echo "setup: NumPy and the stock Rerun tools into $venv"
-    "$venv/bin/pip" install -q --disable-pip-version-check numpy==2.2.6 rerun-sdk==0.36.3 || fail "pip could not install numpy and rerun-sdk"
-    touch "$venv/ready"
+    echo "setup: NumPy, zstandard and the stock Rerun tools into $venv"
+    "$venv/bin/pip" install -q --disable-pip-version-check numpy==2.2.6 zstandard==0.25.0 rerun-sdk==0.36.3 ||
+        fail "pip could not install numpy, zstandard and rerun-sdk"
+    touch "$venv/ready-2"
     ;;
 *) fail "unknown part: $1" ;;
 esac

@@ -7,6 +7,8 @@ use std::io::Write;
 use std::process::ExitCode;
 
 mod bench;
+mod calibrate;
+mod data;
 mod mesh;
 #[cfg(feature = "workbench")]
 mod open;
@@ -18,6 +20,7 @@ mod run;
 mod scene;
 #[cfg(feature = "workbench")]
 mod shot;
+mod train;
 mod views;
 
 /// Manipulation-enhanced mapping of cluttered shelves: look, push, and know how sure you are.
@@ -50,6 +53,12 @@ enum Command {
     Scene(scene::Args),
     /// Check an arm's URDF file: what it reaches, and which views
     Robot(robot::Args),
+    /// Make training data
+    Data(data::Args),
+    /// Train the networks of the belief update
+    Train(train::Args),
+    /// Score belief updates and their calibration on held-out scenes
+    Calibrate(calibrate::Args),
     /// Show what Nudge makes of a mesh
     Mesh(mesh::Args),
     /// Print the poses of a view array
@@ -76,6 +85,9 @@ pub fn main() -> ExitCode {
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Scene(args)) => scene::run(&args),
         Some(Command::Robot(args)) => robot::run(&args),
+        Some(Command::Data(args)) => data::run(&args),
+        Some(Command::Train(args)) => train::run(&args),
+        Some(Command::Calibrate(args)) => calibrate::run(&args),
         Some(Command::Mesh(args)) => mesh::run(&args),
         Some(Command::Views(args)) => views::run(&args),
     };
@@ -100,6 +112,12 @@ fn print(text: &str) -> anyhow::Result<()> {
 /// A document as indented JSON with a line's end.
 fn to_json(document: &impl Serialize) -> anyhow::Result<String> {
     Ok(serde_json::to_string_pretty(document)? + "\n")
+}
+
+/// What to say when networks are asked for in a build without them.
+#[cfg(not(feature = "cnabu"))]
+fn no_networks() -> nudge_core::Error {
+    nudge_core::Error::Usage("this build has no networks; build it with --features cnabu (make cnabu)".to_owned())
 }
 
 /// Tells of something on standard error that does not stop the work.

@@ -8,13 +8,14 @@ use crate::figure::{Moment, Summary, summary};
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
+use nudge_core::cnabu;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Observer, Overwrite, StepOutcome, resume};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::{Body, Catalog, Scene};
 use nudge_core::world::TruthMap;
 use nudge_core::{Error, Result};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 /// File of the recording in an episode's directory.
@@ -163,17 +164,45 @@ pub const BELIEFS: [&str; 2] = ["classical", "cnabu"];
 /// person should know about the choice.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that is unknown, or asked for but not there.
+/// [`Error::Usage`] for a name that is unknown, or asked for but not there; what is wrong with the networks' weights.
 pub fn belief_update(named: Option<&str>, policy: PolicyKind) -> Result<(Arc<dyn BeliefUpdate>, Option<String>)> {
     match named.unwrap_or_else(|| policy.default_belief()) {
         "classical" => Ok((Arc::new(Classical), None)),
-        "cnabu" if named.is_none() => {
-            let note = format!("no network weights are there yet: {policy} runs on the classical belief");
-            Ok((Arc::new(Classical), Some(note)))
-        }
-        "cnabu" => Err(Error::Usage("--belief cnabu: no network weights are there yet; use classical".to_owned())),
+        "cnabu" => match (networks(), named) {
+            (Ok(update), _) => Ok((update, None)),
+            // Broken weights are an error even for who did not ask for them; that there are none is not.
+            (Err(NoNetworks::Broken(error)), _) => Err(error),
+            (Err(NoNetworks::Missing(why)), None) => {
+                Ok((Arc::new(Classical), Some(format!("{why}: {policy} runs on the classical belief"))))
+            }
+            (Err(NoNetworks::Missing(why)), Some(_)) => {
+                Err(Error::Usage(format!("--belief cnabu: {why}; use classical")))
+            }
+        },
         other => Err(Error::Usage(format!("unknown belief \"{other}\"; there are classical, cnabu"))),
     }
+}
+
+/// Why there are no networks to run on.
+enum NoNetworks {
+    /// This build has none, or no weights are there.
+    Missing(&'static str),
+    /// The weights are there but cannot be used.
+    Broken(Error),
+}
+
+/// The networks with the weights that [`cnabu::models_dir`] finds; read once in the program's life.
+fn networks() -> std::result::Result<Arc<dyn BeliefUpdate>, NoNetworks> {
+    static LOADED: OnceLock<Arc<dyn BeliefUpdate>> = OnceLock::new();
+    if !cnabu::AVAILABLE {
+        return Err(NoNetworks::Missing("this build has no networks"));
+    }
+    if let Some(loaded) = LOADED.get() {
+        return Ok(loaded.clone());
+    }
+    let directory = cnabu::models_dir().ok_or(NoNetworks::Missing("no network weights are there"))?;
+    let update = cnabu::load(&directory).map_err(NoNetworks::Broken)?;
+    Ok(LOADED.get_or_init(|| update).clone())
 }
 
 /// Where an episode goes unless told: `out/<scene>-<policy>-<seed>`.

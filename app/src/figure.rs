@@ -2,13 +2,15 @@
 //!
 //! [`summary`] shows one episode: the scene from the front and from above with its pushes, what was believed, how
 //! unsure and how wrong after the first, the middle and the last step, and the scores over the steps. A [`Chart`] has the
-//! lines of several policies, with bands.
+//! lines of several policies, with bands; [`calibration`] shows belief updates on a set of scenes.
 
+mod calibration;
 mod chart;
 mod plot;
 mod summary;
 mod svg;
 
+pub use calibration::{Calibrated, calibration};
 pub use chart::{Chart, Series};
 pub use plot::{Curve, Plot, nice_ticks};
 pub use summary::{Moment, Summary, summary};

@@ -16,6 +16,8 @@ pub mod paths;
 mod remarks;
 mod robot;
 pub(crate) mod shapes;
+#[cfg(feature = "cnabu")]
+pub mod training;
 pub(crate) mod voxels;
 
 pub(crate) use decision::mishaps;

@@ -183,6 +183,14 @@ pub trait BeliefUpdate: Send + Sync {
     /// Name in episodes and reports: `classical`, `cnabu`.
     fn name(&self) -> &str;
 
+    /// Whether beliefs over `grid` can be updated.
+    ///
+    /// # Errors
+    /// For a grid that the update is not made for.
+    fn check_grid(&self, _grid: &Grid) -> crate::Result<()> {
+        Ok(())
+    }
+
     /// The belief after an observation: `lambda' = sigma_o(lambda, o)`.
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief;
 

@@ -3,7 +3,7 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> tool -> arm -> world -> camera -> belief -> gain -> push -> plan -> score -> episode
+//! grid -> solid -> scene -> tool -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> score -> episode -> learn
 //! ```
 //!
 //! One frame everywhere: x right, y into the shelf (0 at its front edge), z up (0 on the board), x = 0 in the
@@ -12,11 +12,13 @@
 pub mod arm;
 pub mod belief;
 pub mod camera;
+pub mod cnabu;
 pub mod episode;
 pub mod error;
 pub mod files;
 pub mod gain;
 pub mod grid;
+pub mod learn;
 pub mod plan;
 pub mod push;
 pub mod rng;

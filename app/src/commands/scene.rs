@@ -14,6 +14,8 @@ mod generate;
 mod rescale;
 mod thumbnail;
 
+pub(super) use generate::{Fill, parse_fill};
+
 /// Make, check, generate, rescale and draw scene files.
 #[derive(clap::Args, Debug)]
 pub struct Args {

@@ -1,11 +1,11 @@
-//! The names of the entities, on the timeline [`TIMELINE`].
+//! The names of the entities, on the timeline [`TIMELINE`] (those of a training run have one of their own).
 //!
 //! Below `/belief`, `/gain`, `/truth` and `/world/shelf` a second form of the same thing (voxels of a floor map, the
 //! scale beside it) is a child of its entity.
 
 use nudge_core::scene::ObjectId;
 
-/// The timeline: number of actions so far.
+/// The timeline of episodes: number of actions so far.
 pub const TIMELINE: &str = "step";
 /// The robot's own clock, seconds that it has moved: for scrubbing through its motions.
 pub const ROBOT_TIMELINE: &str = "robot";
@@ -84,6 +84,16 @@ pub const SCORE_PUSH: &str = "push";
 pub const SCALE: &str = "scale";
 /// The numbers at the scale, below the map.
 pub const SCALE_LABELS: &str = "scale/labels";
+
+/// The timeline of a training run: updates of the weights so far.
+#[cfg(feature = "cnabu")]
+pub const UPDATES: &str = "updates";
+
+/// A curve of a training run.
+#[cfg(feature = "cnabu")]
+pub fn training(curve: &str) -> String {
+    format!("training/{curve}")
+}
 
 /// An object of the scene.
 pub fn object(id: ObjectId) -> String {

@@ -46,8 +46,8 @@ impl Episode {
     /// Sets the scene up (settled), with the uniform belief.
     ///
     /// # Errors
-    /// For a belief update that is not the one the configuration names, an unknown view array, a budget of zero, and a
-    /// scene that gives no bodies.
+    /// For a belief update that is not the one the configuration names or not made for the scene's grid, an unknown view
+    /// array, a budget of zero, and a scene that gives no bodies.
     pub fn new(
         scene: Scene,
         catalog: Arc<Catalog>,
@@ -61,6 +61,7 @@ impl Episode {
         if config.budget == 0 {
             return Err(Error::Usage("the budget must be at least one action".to_owned()));
         }
+        update.check_grid(&scene.grid())?;
         let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         let hands = Arc::new(views.hand_poses(&arm));

@@ -15,6 +15,29 @@ impl VoxelSet {
         Self { words: vec![0; grid.voxel_count().div_ceil(64)], voxel_count: grid.voxel_count() }
     }
 
+    /// The set whose bits are `words` (voxel `i` is bit `i % 64` of word `i / 64`); `None` for another number of words than
+    /// the grid needs. Bits past the last voxel are cleared.
+    pub fn from_words(grid: &Grid, mut words: Vec<u64>) -> Option<Self> {
+        let voxel_count = grid.voxel_count();
+        if words.len() != voxel_count.div_ceil(64) {
+            return None;
+        }
+        if let (Some(last), rest @ 1..) = (words.last_mut(), voxel_count % 64) {
+            *last &= (1 << rest) - 1;
+        }
+        Some(Self { words, voxel_count })
+    }
+
+    /// Number of voxels that could be in the set.
+    pub fn voxel_count(&self) -> usize {
+        self.voxel_count
+    }
+
+    /// The set's bits, 64 voxels a word, the first in the lowest bit.
+    pub fn words(&self) -> &[u64] {
+        &self.words
+    }
+
     /// Whether the voxel at `index` is in the set.
     pub fn contains(&self, index: usize) -> bool {
         self.words[index / 64] >> (index % 64) & 1 == 1
@@ -100,6 +123,8 @@ mod tests {
             prop_assert_eq!((of(&a).len(), of(&a).is_empty()), (a.len(), a.is_empty()));
             prop_assert!((0..150).all(|index| of(&a).contains(index) == a.contains(&index)));
             prop_assert!(emptied.is_empty());
+            prop_assert_eq!(VoxelSet::from_words(&grid, of(&a).words().to_vec()), Some(of(&a)));
+            prop_assert_eq!(VoxelSet::from_words(&grid, vec![0; 2]), None);
         }
     }
 }

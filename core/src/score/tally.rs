@@ -44,11 +44,22 @@ impl Default for Tally {
 impl Tally {
     /// Counts one belief against the truth of the same grid.
     pub fn of(belief: &Belief, truth: &TruthMap) -> Self {
+        Self::of_some(belief, truth, None)
+    }
+
+    /// Counts the floor cells of one belief, and the voxels above them, that `counted` marks.
+    pub fn of_cells(belief: &Belief, truth: &TruthMap, counted: &[bool]) -> Self {
+        Self::of_some(belief, truth, Some(counted))
+    }
+
+    fn of_some(belief: &Belief, truth: &TruthMap, counted: Option<&[bool]>) -> Self {
         assert_eq!(belief.grid.dims, truth.dims, "belief and truth cover different grids");
         let levels = belief.grid.levels_below(SCORED_HEIGHT_M);
         // One slab of equal x per job; merged in order, so that sums of f64 do not depend on the threads.
-        let slabs: Vec<Self> =
-            (0..belief.grid.dims[0]).into_par_iter().map(|x| Self::of_slab(belief, truth, x, levels)).collect();
+        let slabs: Vec<Self> = (0..belief.grid.dims[0])
+            .into_par_iter()
+            .map(|x| Self::of_slab(belief, truth, x, levels, counted))
+            .collect();
         let mut tally = slabs.iter().fold(Self::default(), |mut sum, slab| {
             sum.merge(slab);
             sum
@@ -57,10 +68,10 @@ impl Tally {
         tally
     }
 
-    fn of_slab(belief: &Belief, truth: &TruthMap, x: usize, levels: usize) -> Self {
+    fn of_slab(belief: &Belief, truth: &TruthMap, x: usize, levels: usize, counted: Option<&[bool]>) -> Self {
         let mut tally = Self::default();
         let depth = belief.grid.dims[1];
-        for cell in x * depth..(x + 1) * depth {
+        for cell in (x * depth..(x + 1) * depth).filter(|cell| counted.is_none_or(|counted| counted[*cell])) {
             let column = belief.grid.column(cell);
             let scored = column.start..column.start + levels;
             // Neighbours in a column mostly share their evidence: logarithms are taken once per run of equals.

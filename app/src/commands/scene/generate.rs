@@ -53,10 +53,12 @@ pub struct Args {
     json: bool,
 }
 
+/// A range of floor shares.
 #[derive(Clone, Copy, Debug)]
-struct Fill([f32; 2]);
+pub(in crate::commands) struct Fill(pub(in crate::commands) [f32; 2]);
 
-fn parse_fill(text: &str) -> Result<Fill, String> {
+/// `0.4`, or a range, `0.30-0.45`.
+pub(in crate::commands) fn parse_fill(text: &str) -> Result<Fill, String> {
     let number = |text: &str| text.trim().parse::<f32>().map_err(|_| format!("`{text}` is not a number"));
     let (low, high) = text.split_once('-').unwrap_or((text, text));
     Ok(Fill([number(low)?, number(high)?]))

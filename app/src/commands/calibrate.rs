@@ -1,0 +1,161 @@
+//! `nudge calibrate`: how good and how well calibrated belief updates are on held-out scenes, against the number of views.
+
+use crate::figure::{Calibrated, PIXELS_PER_UNIT, calibration, escape};
+use crate::picture;
+use indicatif::ProgressBar;
+use nudge_core::Error;
+use nudge_core::belief::{BeliefUpdate, Classical};
+use nudge_core::cnabu::{self, Scored};
+use nudge_core::files::write_atomically;
+use nudge_core::learn::{Dataset, MapSample, PushSample, evaluate, evaluate_pushes};
+use nudge_core::score::{Scores, Tally};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// What was typed.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// Held-out data of `nudge data maps`
+    #[arg(long, value_name = "DIR")]
+    data: PathBuf,
+    /// Held-out data of `nudge data pushes`: also score predictions on the floor cells that pushes change
+    #[arg(long, value_name = "DIR")]
+    pushes: Option<PathBuf>,
+    /// Scenes of each to use
+    #[arg(long, default_value_t = 300)]
+    scenes: usize,
+    /// Directory of the weights [default: where the shipped ones are]
+    #[arg(long, value_name = "DIR")]
+    models: Option<PathBuf>,
+    /// Only these belief updates
+    #[arg(long, value_delimiter = ',', default_value = "cnabu,classical")]
+    beliefs: Vec<String>,
+    /// Directory for the page and its figures
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print a JSON document instead of the table
+    #[arg(long)]
+    json: bool,
+}
+
+/// Scores after each number of views.
+pub(super) fn scored(tallies: &[Tally]) -> Vec<Scored> {
+    let row = |(at, tally): (usize, &Tally)| {
+        let scores = tally.scores();
+        Scored {
+            views: at + 1,
+            occupancy_iou: scores.occupancy_iou,
+            occupied_iou: scores.occupied_iou,
+            semantic_miou: scores.semantic_miou,
+            mece_occupancy: scores.mece_occupancy,
+            mece_semantics: scores.mece_semantics,
+        }
+    };
+    tallies.iter().enumerate().map(row).collect()
+}
+
+/// A table of scores, one line per number of views.
+pub(super) fn table(name: &str, scores: &[Scored]) -> String {
+    let mut text = format!("{name:<10} views  occupancy IoU  occupied IoU  semantic mIoU  mECE occ.  mECE sem.\n");
+    for s in scores {
+        text += &format!(
+            "{:<10} {:>5}  {:>13.3}  {:>12.3}  {:>13.3}  {:>9.3}  {:>9.3}\n",
+            "", s.views, s.occupancy_iou, s.occupied_iou, s.semantic_miou, s.mece_occupancy, s.mece_semantics
+        );
+    }
+    text
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// For data that is not there, weights that are missing or damaged, and what cannot be written.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let mut data = Dataset::<MapSample>::open(&args.data)?;
+    data.skipped().iter().for_each(|skipped| super::warn(&format!("skipped: {skipped}")));
+    data.truncate(args.scenes);
+    let mut pushes = args.pushes.as_deref().map(Dataset::<PushSample>::open).transpose()?;
+    if let Some(pushes) = &mut pushes {
+        pushes.skipped().iter().for_each(|skipped| super::warn(&format!("skipped: {skipped}")));
+        pushes.truncate(args.scenes);
+    }
+    let mut results: Vec<(String, Vec<Tally>)> = Vec::new();
+    let mut predictions: Vec<(String, Scores)> = Vec::new();
+    for name in &args.beliefs {
+        let update: Arc<dyn BeliefUpdate> = match name.as_str() {
+            "classical" => Arc::new(Classical),
+            "cnabu" => {
+                let directory = args.models.clone().or_else(cnabu::models_dir);
+                let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
+                cnabu::load(&directory.ok_or_else(missing)?)?
+            }
+            other => anyhow::bail!("unknown belief \"{other}\"; there are cnabu, classical"),
+        };
+        let bar = ProgressBar::new(data.len() as u64).with_message(name.clone());
+        let tallies = evaluate(&data, &*update, &mut |done| bar.set_position(done as u64))?;
+        bar.finish_and_clear();
+        results.push((name.clone(), tallies));
+        if let Some(pushes) = &pushes {
+            let tallies = evaluate_pushes(pushes, &*update, &*update, &mut |_| ())?;
+            predictions.push((name.clone(), tallies.predicted.scores()));
+            predictions.push((format!("{name}, as if nothing had changed"), tallies.unchanged.scores()));
+        }
+    }
+    let page = args.out.as_deref().map(|out| write_page(out, &args.data, data.len(), &results)).transpose()?;
+    if args.json {
+        let rows: Vec<_> = results
+            .iter()
+            .map(|(name, tallies)| serde_json::json!({ "belief": name, "scores": scored(tallies), "tallies": tallies }))
+            .collect();
+        return super::print(&super::to_json(
+            &serde_json::json!({ "data": args.data, "scenes": data.len(), "results": rows }),
+        )?);
+    }
+    super::print(&format!("{}: {} scenes\n", args.data.display(), data.len()))?;
+    for (name, tallies) in &results {
+        super::print(&table(name, &scored(tallies)))?;
+    }
+    if !predictions.is_empty() {
+        super::print("\nafter pushes, on the floor cells that change:  occupied IoU  semantic mIoU  mECE occ.\n")?;
+        for (name, s) in &predictions {
+            let line =
+                format!("{name:<45} {:>13.3} {:>14.3} {:>10.3}\n", s.occupied_iou, s.semantic_miou, s.mece_occupancy);
+            super::print(&line)?;
+        }
+    }
+    page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
+}
+
+/// Writes `calibration.html` and `calibration.png` into a directory; gives the page's path.
+fn write_page(out: &Path, data: &Path, scenes: usize, results: &[(String, Vec<Tally>)]) -> Result<PathBuf, Error> {
+    let title = format!("Belief updates on {scenes} held-out scenes, random views");
+    let updates: Vec<Calibrated<'_>> = results.iter().map(|(name, tallies)| Calibrated { name, tallies }).collect();
+    let figure = calibration(&title, &updates);
+    let mut html = format!(
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>body {{ font: 15px/1.5 \
+         Ubuntu, sans-serif; color: #22242a; max-width: 1060px; margin: 2em auto }} td, th {{ padding: 0 1em 0 0; text-align: \
+         right }} svg {{ max-width: 100% }}</style></head><body>\n<h1>{0}</h1>\n<p>Data: {1}</p>\n{2}\n",
+        escape(&title),
+        escape(&data.display().to_string()),
+        figure.document()
+    );
+    for (name, tallies) in results {
+        html += &format!(
+            "<h2>{}</h2>\n<table><tr><th>views</th><th>occupancy IoU</th><th>occupied IoU</th><th>semantic mIoU</th>\
+             <th>mECE occupancy</th><th>mECE semantics</th></tr>\n",
+            escape(name)
+        );
+        for s in scored(tallies) {
+            let numbers = [s.occupancy_iou, s.occupied_iou, s.semantic_miou, s.mece_occupancy, s.mece_semantics];
+            let cells: String = numbers.iter().map(|n| format!("<td>{n:.3}</td>")).collect();
+            html += &format!("<tr><td>{}</td>{cells}</tr>\n", s.views);
+        }
+        html += "</table>\n";
+    }
+    html += "</body></html>\n";
+    std::fs::create_dir_all(out).map_err(|error| Error::io(out, error))?;
+    picture::save(&figure.render(PIXELS_PER_UNIT)?, &out.join("calibration.png"))?;
+    let page = out.join("calibration.html");
+    write_atomically(&page, html.as_bytes())?;
+    Ok(page)
+}

@@ -1,0 +1,109 @@
+//! `nudge train export`: a checkpoint becomes weights with a card.
+
+use super::{ExportArgs, Network};
+use crate::commands::{calibrate, print};
+use nudge_core::Error;
+use nudge_core::belief::Classical;
+use nudge_core::cnabu::{Card, Cnabu, Layout, OBSERVE_WEIGHTS, PUSH_WEIGHTS, Tensor, half, write_tensors};
+use nudge_core::learn::{
+    Dataset, MapSample, PushSample, PushTrainer, Sample, TrainSettings, Trainer, evaluate, evaluate_pushes,
+};
+use nudge_core::score::Scores;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub(super) fn run(args: &ExportArgs) -> anyhow::Result<()> {
+    std::fs::create_dir_all(&args.out).map_err(|error| Error::io(&args.out, error))?;
+    match args.network {
+        Network::Observe => observe(args),
+        Network::Push => push(args),
+    }
+}
+
+fn observe(args: &ExportArgs) -> anyhow::Result<()> {
+    let test = open::<MapSample>(&args.test, args.scenes)?;
+    let settings = Trainer::logged_settings(&args.run)?;
+    let device = nudge_core::cnabu::device("cpu")?;
+    let trainer = Trainer::load(&args.run, settings.clone(), Layout::new(&test.grid())?, device)?;
+    let path = args.out.join(OBSERVE_WEIGHTS);
+    let mut card = Card::new("sigma_o", settings.width, trainer.parameters());
+    describe::<MapSample>(&mut card, args, &test, &settings, trainer.updates())?;
+    write(&path, &card, &trainer.mean_weights(), args.half)?;
+    // What is scored is what was written, rounding included.
+    card.scores = calibrate::scored(&evaluate(&test, &Cnabu::load_file(&path)?, &mut |_| ())?);
+    card.write(&path)?;
+    print(&format!("{}\n{}", path.display(), calibrate::table("sigma_o", &card.scores)))
+}
+
+fn push(args: &ExportArgs) -> anyhow::Result<()> {
+    let test = open::<PushSample>(&args.test, args.scenes)?;
+    let settings = PushTrainer::logged_settings(&args.run)?;
+    let device = nudge_core::cnabu::device("cpu")?;
+    let trainer = PushTrainer::load(&args.run, settings.clone(), Layout::new(&test.grid())?, device)?;
+    let path = args.out.join(PUSH_WEIGHTS);
+    let mut card = trainer.card();
+    describe::<PushSample>(&mut card, args, &test, &settings, trainer.updates())?;
+    write(&path, &card, &trainer.mean_weights(), args.half)?;
+    let update = Cnabu::load(&args.out)?;
+    let ours = evaluate_pushes(&test, &update, &update, &mut |_| ())?;
+    let classical = evaluate_pushes(&test, &update, &Classical, &mut |_| ())?;
+    for (name, scores) in [
+        ("sigma_m", ours.predicted.scores()),
+        ("unchanged", ours.unchanged.scores()),
+        ("classical", classical.predicted.scores()),
+    ] {
+        card.pushes.extend(rows(name, &scores));
+    }
+    card.write(&path)?;
+    let lines: String = card.pushes.iter().map(|(name, score)| format!("{name:<28} {score:.3}\n")).collect();
+    print(&format!("{}\n{lines}", path.display()))
+}
+
+fn rows(name: &str, scores: &Scores) -> [(String, f64); 3] {
+    [
+        (format!("{name}_occupied_iou"), scores.occupied_iou),
+        (format!("{name}_semantic_miou"), scores.semantic_miou),
+        (format!("{name}_mece_occupancy"), scores.mece_occupancy),
+    ]
+}
+
+fn open<S: Sample>(directory: &Path, scenes: usize) -> anyhow::Result<Dataset<S>> {
+    let mut test = Dataset::<S>::open(directory)?;
+    test.truncate(scenes);
+    Ok(test)
+}
+
+fn write(path: &Path, card: &Card, weights: &[(String, Tensor)], halved: bool) -> nudge_core::Result<()> {
+    let kept = |tensor: &Tensor| if halved { half(tensor) } else { tensor.shallow_clone() };
+    let tensors: Vec<_> = weights.iter().map(|(name, tensor)| (name.clone(), kept(tensor))).collect();
+    write_tensors(path, &tensors)?;
+    card.write(path)
+}
+
+/// Tells the card how its weights came about, as commands that can be typed again.
+fn describe<S: Sample>(
+    card: &mut Card,
+    args: &ExportArgs,
+    test: &Dataset<S>,
+    settings: &TrainSettings,
+    updates: u64,
+) -> anyhow::Result<()> {
+    let command = |data: &Dataset<S>| {
+        let card = data.card();
+        format!("nudge data {} --seed {} --count {} --noise {}", S::KIND, card.seed, data.len(), card.noise_share)
+    };
+    if let Some(data) = &args.data {
+        card.data.insert("train".into(), command(&Dataset::open(data)?));
+    }
+    card.data.insert("test".into(), command(test));
+    card.training = strings(settings)?;
+    card.training.insert("updates".into(), updates.to_string());
+    Ok(())
+}
+
+/// Settings as the card's words.
+fn strings(settings: &impl Serialize) -> anyhow::Result<BTreeMap<String, String>> {
+    let serde_json::Value::Object(table) = serde_json::to_value(settings)? else { return Ok(BTreeMap::new()) };
+    Ok(table.into_iter().map(|(name, value)| (name, value.to_string())).collect())
+}

@@ -1,0 +1,138 @@
+//! What a training run does beside training: it reports, keeps checkpoints, validates, and knows when to stop.
+
+use super::SessionArgs;
+use super::curve::Curve;
+use crate::commands::warn;
+use nudge_core::Error;
+use nudge_core::cnabu::{Device, set_threads};
+use nudge_core::learn::{Dataset, Sample, TrainSettings, checkpoint_path};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// A line of losses is printed and kept this often.
+const REPORT_EVERY: Duration = Duration::from_secs(30);
+
+/// A network in training, as a session sees it.
+pub(super) trait Pupil {
+    /// Trains a little; `rate` scales the step size.
+    fn train(&mut self, rate: f64, curve: &mut Curve) -> nudge_core::Result<()>;
+    /// Writes a checkpoint.
+    fn save(&self, out: &Path) -> nudge_core::Result<()>;
+    /// Updates of the weights so far.
+    fn updates(&self) -> u64;
+    /// Scores the running mean of the weights; what is to fall.
+    fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64>;
+}
+
+/// How a run begins.
+pub(super) enum Begin<'a> {
+    /// With fresh weights.
+    Fresh,
+    /// With the checkpoint of another run.
+    From(&'a Path),
+    /// Where it was stopped.
+    Resume,
+}
+
+impl SessionArgs {
+    /// The settings, with a network's own width and views.
+    pub(super) fn settings(&self, width: i64, max_views: usize) -> TrainSettings {
+        TrainSettings {
+            seed: self.seed,
+            width,
+            batch: self.batch,
+            learning_rate: self.learning_rate,
+            max_views,
+            kl_weight: self.kl,
+            ..TrainSettings::default()
+        }
+    }
+
+    /// Sets the threads and gives the device.
+    pub(super) fn device(&self) -> nudge_core::Result<Device> {
+        set_threads(self.threads);
+        nudge_core::cnabu::device(&self.device)
+    }
+
+    /// How the run begins; refuses to write over one that is there.
+    pub(super) fn begin(&self) -> nudge_core::Result<Begin<'_>> {
+        let there = checkpoint_path(&self.out);
+        if self.resume {
+            return Ok(Begin::Resume);
+        }
+        if there.exists() && !self.force {
+            return Err(Error::input(there, "", "is there already; --resume goes on with it, --force replaces it"));
+        }
+        Ok(self.from.as_deref().map_or(Begin::Fresh, Begin::From))
+    }
+
+    /// The training data, and the validation data if there is some.
+    pub(super) fn open<S: Sample>(&self) -> nudge_core::Result<(Dataset<S>, Option<Dataset<S>>)> {
+        let data = open::<S>(&self.data)?;
+        let mut val = self.val.as_deref().map(open::<S>).transpose()?;
+        if let Some(val) = &mut val {
+            val.truncate(self.validate_scenes);
+        }
+        Ok((data, val))
+    }
+
+    /// The step size's share: 1, and a half cosine down to 0 over the cooldown.
+    fn rate(&self, updates: u64) -> f64 {
+        let left = self.updates.map_or(u64::MAX, |end| end.saturating_sub(updates));
+        if left >= self.cooldown {
+            return 1.0;
+        }
+        0.5 - 0.5 * (std::f64::consts::PI * left as f64 / self.cooldown as f64).cos()
+    }
+
+    /// Trains until it is over.
+    pub(super) fn run(&self, pupil: &mut dyn Pupil) -> anyhow::Result<()> {
+        // Early, so that a place that cannot be written is told at once.
+        pupil.save(&self.out)?;
+        let mut curve = Curve::open(&self.out, self.resume, self.follow, pupil.updates())?;
+        let started = Instant::now();
+        let (mut reported, mut saved, mut validated) = (started, started, started);
+        let (mut least, mut stale) = (f64::INFINITY, 0);
+        while !self.is_over(pupil.updates(), started) {
+            pupil.train(self.rate(pupil.updates()), &mut curve)?;
+            if reported.elapsed() >= REPORT_EVERY {
+                reported = Instant::now();
+                curve.report(pupil.updates())?;
+            }
+            if saved.elapsed().as_secs_f64() >= 60.0 * self.checkpoint_minutes {
+                saved = Instant::now();
+                // The last checkpoint is still there; the next try may find room.
+                if let Err(error) = pupil.save(&self.out) {
+                    warn(&format!("no checkpoint: {error}"));
+                }
+            }
+            if self.val.is_some() && validated.elapsed().as_secs_f64() >= 60.0 * self.validate_minutes {
+                let error = pupil.validate(&mut curve)?;
+                stale = if error < least { 0 } else { stale + 1 };
+                least = least.min(error);
+                if self.patience.is_some_and(|patience| stale >= patience) {
+                    eprintln!("stopped: {stale} validations in a row did not improve");
+                    break;
+                }
+                validated = Instant::now();
+            }
+        }
+        pupil.save(&self.out)?;
+        curve.report(pupil.updates())?;
+        if self.val.is_some() {
+            pupil.validate(&mut curve)?;
+        }
+        crate::commands::print(&format!("{}: {} updates\n", checkpoint_path(&self.out).display(), pupil.updates()))
+    }
+
+    fn is_over(&self, updates: u64, started: Instant) -> bool {
+        self.updates.is_some_and(|end| updates >= end)
+            || self.minutes.is_some_and(|minutes| started.elapsed().as_secs_f64() >= 60.0 * minutes)
+    }
+}
+
+fn open<S: Sample>(directory: &Path) -> nudge_core::Result<Dataset<S>> {
+    let data = Dataset::open(directory)?;
+    data.skipped().iter().for_each(|skipped| warn(&format!("skipped: {skipped}")));
+    Ok(data)
+}

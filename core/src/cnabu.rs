@@ -1,0 +1,127 @@
+//! Calibrated neural-accelerated belief update (CNABU): sigma_o for observations, sigma_m for pushes, as networks.
+//!
+//! Both are residual U-Nets over the floor plan whose channels are the heights; they give evidence, a Beta per voxel and a
+//! Dirichlet per floor cell, and are trained with evidential losses on our own simulated data ([`crate::learn`]).
+//!
+//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has this module's
+//! door only: [`AVAILABLE`] is false, and [`load`] says so.
+
+#[cfg(feature = "cnabu")]
+mod layout;
+#[cfg(feature = "cnabu")]
+mod loss;
+#[cfg(feature = "cnabu")]
+mod net;
+#[cfg(feature = "cnabu")]
+mod observe_net;
+#[cfg(feature = "cnabu")]
+mod predict;
+#[cfg(feature = "cnabu")]
+mod push_net;
+mod scored;
+#[cfg(feature = "cnabu")]
+mod update;
+#[cfg(feature = "cnabu")]
+mod weights;
+
+#[cfg(feature = "cnabu")]
+pub use layout::{LEVELS, Layout, Mirror};
+#[cfg(feature = "cnabu")]
+pub use loss::{LossForm, expected_log_loss, kl_to_uniform, marginal_log_loss, occupancy_loss, semantics_loss};
+#[cfg(feature = "cnabu")]
+pub use observe_net::{Evidence, ObserveConfig, ObserveNet};
+#[cfg(feature = "cnabu")]
+pub(crate) use predict::{push_planes, windows};
+#[cfg(feature = "cnabu")]
+pub(crate) use push_net::WINDOW;
+#[cfg(feature = "cnabu")]
+pub use push_net::{PushConfig, PushNet, Pushed};
+pub use scored::Scored;
+#[cfg(feature = "cnabu")]
+pub use tch::{Device, Tensor};
+#[cfg(feature = "cnabu")]
+pub use update::Cnabu;
+#[cfg(feature = "cnabu")]
+pub(crate) use update::observation_planes;
+#[cfg(feature = "cnabu")]
+pub use weights::{Card, card_path, read_tensors, write_tensors};
+
+use crate::Result;
+use crate::belief::BeliefUpdate;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// File name of sigma_m's weights; without it pushes are predicted classically.
+pub const PUSH_WEIGHTS: &str = "sigma_m.safetensors";
+/// Whether this build can run the networks.
+pub const AVAILABLE: bool = cfg!(feature = "cnabu");
+/// File name of sigma_o's weights in a models directory; its card is beside it, with `.toml`.
+pub const OBSERVE_WEIGHTS: &str = "sigma_o.safetensors";
+/// Names the directory of weights, before any other place.
+pub const MODELS_ENV: &str = "NUDGE_MODELS";
+
+/// The device that weights are loaded onto: `cpu`, `cuda`, or `auto`.
+pub const DEVICE_ENV: &str = "NUDGE_DEVICE";
+
+/// The directory of weights: [`MODELS_ENV`] if it is set, else the first `models` with weights in it beside or above the
+/// program, in the working directory, or in the source tree that it was built from.
+pub fn models_dir() -> Option<PathBuf> {
+    if let Some(directory) = std::env::var_os(MODELS_ENV) {
+        return Some(directory.into());
+    }
+    let program = std::env::current_exe().ok();
+    let beside = program.iter().flat_map(|path| path.ancestors().skip(1)).map(|above| above.join("models"));
+    let rest = [PathBuf::from("models"), Path::new(env!("CARGO_MANIFEST_DIR")).join("../models")];
+    beside.chain(rest).find(|directory| directory.join(OBSERVE_WEIGHTS).is_file())
+}
+
+/// The device that [`DEVICE_ENV`] names, CUDA when it is there otherwise.
+#[cfg(feature = "cnabu")]
+fn chosen_device() -> Result<Device> {
+    device(&std::env::var(DEVICE_ENV).unwrap_or_else(|_| "auto".to_owned()))
+}
+
+/// Number of threads that libtorch computes with.
+#[cfg(feature = "cnabu")]
+pub fn set_threads(threads: usize) {
+    tch::set_num_threads(threads.clamp(1, 1024) as i32);
+}
+
+/// The device of a name: `cpu`, `cuda`, or `auto` for CUDA when libtorch has it.
+///
+/// # Errors
+/// [`Error::Usage`](crate::Error::Usage) for another name, and for `cuda` where there is none.
+#[cfg(feature = "cnabu")]
+pub fn device(name: &str) -> Result<Device> {
+    match name {
+        "auto" => Ok(Device::cuda_if_available()),
+        "cpu" => Ok(Device::Cpu),
+        "cuda" if tch::Cuda::is_available() => Ok(Device::Cuda(0)),
+        "cuda" => Err(crate::Error::Usage("device cuda: this libtorch finds no CUDA device".to_owned())),
+        other => Err(crate::Error::Usage(format!("unknown device \"{other}\"; there are auto, cpu, cuda"))),
+    }
+}
+
+/// A tensor rounded to 16 bits.
+#[cfg(feature = "cnabu")]
+pub fn half(tensor: &Tensor) -> Tensor {
+    tensor.to_kind(tch::Kind::Half)
+}
+
+/// The networks with the weights in `directory`, as a belief update.
+///
+/// # Errors
+/// In a build without networks; for weights that are missing, damaged, not finite, or of another grid, class list or version.
+#[cfg(feature = "cnabu")]
+pub fn load(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    Ok(Arc::new(Cnabu::load(directory)?))
+}
+
+/// The networks with the weights in `directory`: not in this build.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "cnabu"))]
+pub fn load(_directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    Err(crate::Error::Usage("this build has no networks; build it with --features cnabu (make cnabu)".to_owned()))
+}

@@ -1,0 +1,153 @@
+//! sigma_o: from prior evidence and an observation to posterior evidence.
+//!
+//! A U-Net sees everything through a narrow stem and completes what was not seen: the far sides and insides of objects.
+//! What is already known does not have to squeeze through it: prior evidence and observation lead past it to the heads,
+//! scaled per level or class, so that an untrained network already adds up what it is told. A semantic head of its own sees
+//! the labels, the prior Dirichlet and a slice of the occupancy posterior 3 cm above the board.
+
+use super::layout::{LABELS, LEVELS, OCCUPANCY, SEMANTICS, SUBS};
+use super::net::{UNet, conv};
+use crate::scene::CLASS_COUNT;
+use tch::nn::{self, Module};
+use tch::{Kind, Tensor};
+
+/// Level of the slice that the semantic head sees: 3 cm above the board.
+const SLICE_LEVEL: i64 = 3;
+/// Largest `ln a` that is carried on: evidence of about 1,100.
+pub(super) const LOG_EVIDENCE_LIMIT: f64 = 7.0;
+
+/// What the network's size is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ObserveConfig {
+    /// Channels of the U-Net's first level; a multiple of 8.
+    pub width: i64,
+}
+
+impl Default for ObserveConfig {
+    fn default() -> Self {
+        Self { width: 32 }
+    }
+}
+
+/// Logarithms of evidence as planes: a network's state between observations.
+#[derive(Debug)]
+pub struct Evidence {
+    /// `[B, 2 * levels * 4, X, Y]`: occupied, then free.
+    pub occupancy: Tensor,
+    /// `[B, classes * 4, X, Y]`.
+    pub semantics: Tensor,
+}
+
+impl Evidence {
+    /// The uniform prior for a batch of planes.
+    pub fn uniform(batch: i64, [x, y]: [i64; 2], device: tch::Device) -> Self {
+        let zeros = |channels: usize| Tensor::zeros([batch, channels as i64, x, y], (Kind::Float, device));
+        Self { occupancy: zeros(2 * OCCUPANCY), semantics: zeros(SEMANTICS) }
+    }
+
+    /// What heads gave, as state: `ln a = softplus(z)`, limited, cut off from its history.
+    pub fn of_heads(z_occupancy: &Tensor, z_semantics: &Tensor) -> Self {
+        let log = |z: &Tensor| z.detach().softplus().clamp_max_(LOG_EVIDENCE_LIMIT);
+        Self { occupancy: log(z_occupancy), semantics: log(z_semantics) }
+    }
+}
+
+/// The network sigma_o.
+#[derive(Debug)]
+pub struct ObserveNet {
+    stem_prior: nn::Conv2D,
+    stem_semantics: nn::Conv2D,
+    stem_observed: nn::Conv2D,
+    stem_labels: nn::Conv2D,
+    unet: UNet,
+    occupancy_head: nn::Conv2D,
+    semantic_mix: nn::Conv2D,
+    semantic_labels: nn::Conv2D,
+    semantic_prior: nn::Conv2D,
+    semantic_slice: nn::Conv2D,
+    semantic_inner: nn::Conv2D,
+    semantic_head: nn::Conv2D,
+    /// Per channel: what the prior's logarithm, an observation of the same kind and one of the other kind add to `z`.
+    keep_occupancy: Tensor,
+    agree: Tensor,
+    disagree: Tensor,
+    keep_semantics: Tensor,
+    label: Tensor,
+}
+
+/// Channels of the semantic head.
+const SEMANTIC_WIDTH: i64 = 64;
+
+impl ObserveNet {
+    /// The network with its variables under `path`.
+    pub fn new(path: &nn::Path<'_>, config: ObserveConfig) -> Self {
+        let (occupancy, semantics, labels) = (2 * OCCUPANCY as i64, SEMANTICS as i64, LABELS as i64);
+        let stem = 2 * config.width;
+        let per_channel =
+            |name: &str, channels: i64, value: f64| path.var(name, &[1, channels, 1, 1], nn::Init::Const(value));
+        let small = |name: &str, from: i64, to: i64, bias: f64| {
+            let init = nn::ConvConfig {
+                ws_init: nn::Init::Randn { mean: 0.0, stdev: 0.02 },
+                bs_init: nn::Init::Const(bias),
+                ..Default::default()
+            };
+            nn::conv2d(path / name, from, to, 1, init)
+        };
+        Self {
+            stem_prior: conv(path / "stem_prior", occupancy, stem, 1),
+            stem_semantics: conv(path / "stem_semantics", semantics, stem, 1),
+            stem_observed: conv(path / "stem_observed", occupancy, stem, 1),
+            stem_labels: conv(path / "stem_labels", labels, stem, 1),
+            unet: UNet::new(&(path / "unet"), stem, config.width),
+            occupancy_head: small("occupancy_head", config.width, occupancy, -1.0),
+            semantic_mix: conv(path / "semantic_mix", config.width, SEMANTIC_WIDTH, 1),
+            semantic_labels: conv(path / "semantic_labels", labels, SEMANTIC_WIDTH, 1),
+            semantic_prior: conv(path / "semantic_prior", semantics, SEMANTIC_WIDTH, 1),
+            semantic_slice: conv(path / "semantic_slice", 2 * SUBS as i64, SEMANTIC_WIDTH, 1),
+            semantic_inner: conv(path / "semantic_inner", SEMANTIC_WIDTH, SEMANTIC_WIDTH, 3),
+            semantic_head: small("semantic_head", SEMANTIC_WIDTH, semantics, -1.0),
+            keep_occupancy: per_channel("keep_occupancy", occupancy, 1.0),
+            agree: per_channel("agree", occupancy, 2.0),
+            disagree: per_channel("disagree", occupancy, -1.0),
+            keep_semantics: per_channel("keep_semantics", semantics, 1.0),
+            label: per_channel("label", semantics, 2.0),
+        }
+    }
+
+    /// `z` of the posterior (`a = 1 + e^z`), of the shapes of [`Evidence`], from the prior, the levels observed (occupied,
+    /// then free; `[B, 2 * levels * 4, X, Y]`) and the one-hot labels (`[B, 16 * 4, X, Y]`).
+    pub fn forward(&self, prior: &Evidence, observed: &Tensor, labels: &Tensor) -> (Tensor, Tensor) {
+        let half = OCCUPANCY as i64;
+        let stem = prior.occupancy.apply(&self.stem_prior)
+            + prior.semantics.apply(&self.stem_semantics)
+            + observed.apply(&self.stem_observed)
+            + labels.apply(&self.stem_labels);
+        let features = self.unet.forward(&stem.relu());
+
+        let opposite = observed.roll([half], [1]);
+        let z_occupancy = features
+            .apply(&self.occupancy_head)
+            .addcmul(&self.keep_occupancy, &prior.occupancy)
+            .addcmul(&self.agree, observed)
+            .addcmul(&self.disagree, &opposite);
+
+        let slice = |first: i64| z_occupancy.narrow(1, first + SLICE_LEVEL * SUBS as i64, SUBS as i64);
+        let slice = Tensor::cat(&[slice(0), slice(half)], 1).detach().clamp(-8.0, 8.0);
+        let mixed = features.apply(&self.semantic_mix)
+            + labels.apply(&self.semantic_labels)
+            + prior.semantics.apply(&self.semantic_prior)
+            + slice.apply(&self.semantic_slice);
+        let mixed = mixed.relu();
+        let inner = mixed.apply(&self.semantic_inner).relu_() + mixed;
+        let z_semantics = inner
+            .apply(&self.semantic_head)
+            .addcmul(&self.keep_semantics, &prior.semantics)
+            .addcmul(&self.label, &labels.narrow(1, 0, SEMANTICS as i64));
+        (z_occupancy, z_semantics)
+    }
+
+    /// Numbers of levels and classes that the planes hold.
+    pub fn counts() -> (usize, usize) {
+        (LEVELS, CLASS_COUNT)
+    }
+}

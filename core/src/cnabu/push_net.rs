@@ -1,0 +1,118 @@
+//! sigma_m: from prior evidence and a push to the evidence that the push is predicted to leave, and where it changes
+//! anything.
+//!
+//! The network sees a window of the floor plan around the push: as wide as the tool and what it moves can reach, and as
+//! deep as the shelf. Its stem is made of 1 x 1 convolutions, so the prior's part is computed once for all candidates of a
+//! decision and cut out per window. As in sigma_o the prior leads past the U-Net to the heads.
+
+use super::layout::{OCCUPANCY, SEMANTICS, SUBS};
+use super::net::{UNet, conv};
+use super::observe_net::Evidence;
+use tch::Tensor;
+use tch::nn::{self, Module};
+
+/// Pixels of the window along x: 0.4 m.
+pub(crate) const WINDOW: usize = 40;
+/// Planes that mark the ends of the push: start, end.
+pub(super) const MARKS: usize = 2 * SUBS;
+
+/// What the network's size is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PushConfig {
+    /// Channels of the U-Net's first level; a multiple of 8.
+    pub width: i64,
+}
+
+impl Default for PushConfig {
+    fn default() -> Self {
+        Self { width: 24 }
+    }
+}
+
+/// What the heads give: `z` with `a = 1 + e^z`.
+#[derive(Debug)]
+pub struct Pushed {
+    /// `[B, 2 * levels * 4, WINDOW, Y]`: occupied, then free, where something changes.
+    pub occupancy: Tensor,
+    /// `[B, classes * 4, WINDOW, Y]`.
+    pub semantics: Tensor,
+    /// `[B, 2 * 4, WINDOW, Y]`: for and against that a floor cell changes.
+    pub change: Tensor,
+}
+
+/// The network sigma_m.
+#[derive(Debug)]
+pub struct PushNet {
+    stem_prior: nn::Conv2D,
+    stem_semantics: nn::Conv2D,
+    stem_swept: nn::Conv2D,
+    stem_marks: nn::Conv2D,
+    unet: UNet,
+    occupancy_head: nn::Conv2D,
+    semantic_mix: nn::Conv2D,
+    semantic_prior: nn::Conv2D,
+    semantic_inner: nn::Conv2D,
+    semantic_head: nn::Conv2D,
+    change_inner: nn::Conv2D,
+    change_head: nn::Conv2D,
+    keep_occupancy: Tensor,
+    keep_semantics: Tensor,
+    /// Per channel: what being swept adds to `z`.
+    swept: Tensor,
+}
+
+impl PushNet {
+    /// The network with its variables under `path`.
+    pub fn new(path: &nn::Path<'_>, config: PushConfig) -> Self {
+        let (occupancy, semantics) = (2 * OCCUPANCY as i64, SEMANTICS as i64);
+        let (stem, width) = (2 * config.width, config.width);
+        let per_channel =
+            |name: &str, channels: i64, value: f64| path.var(name, &[1, channels, 1, 1], nn::Init::Const(value));
+        let small = |name: &str, to: i64, bias: f64| {
+            let init = nn::ConvConfig {
+                ws_init: nn::Init::Randn { mean: 0.0, stdev: 0.02 },
+                bs_init: nn::Init::Const(bias),
+                ..Default::default()
+            };
+            nn::conv2d(path / name, width, to, 1, init)
+        };
+        Self {
+            stem_prior: conv(path / "stem_prior", occupancy, stem, 1),
+            stem_semantics: conv(path / "stem_semantics", semantics, stem, 1),
+            stem_swept: conv(path / "stem_swept", OCCUPANCY as i64, stem, 1),
+            stem_marks: conv(path / "stem_marks", MARKS as i64, stem, 1),
+            unet: UNet::new(&(path / "unet"), stem, width),
+            occupancy_head: small("occupancy_head", occupancy, 0.0),
+            semantic_mix: conv(path / "semantic_mix", width, width, 1),
+            semantic_prior: conv(path / "semantic_prior", semantics, width, 1),
+            semantic_inner: conv(path / "semantic_inner", width, width, 3),
+            semantic_head: small("semantic_head", semantics, -1.0),
+            change_inner: conv(path / "change_inner", width, width, 3),
+            change_head: small("change_head", MARKS as i64, 0.0),
+            keep_occupancy: per_channel("keep_occupancy", occupancy, 0.5),
+            keep_semantics: per_channel("keep_semantics", semantics, 0.5),
+            swept: per_channel("swept", occupancy, 0.0),
+        }
+    }
+
+    /// The prior's part of the stem, over the whole floor plan.
+    pub fn prior_stem(&self, prior: &Evidence) -> Tensor {
+        prior.occupancy.apply(&self.stem_prior) + prior.semantics.apply(&self.stem_semantics)
+    }
+
+    /// The prediction from the prior's stem and the prior, both cut to the windows, the swept levels
+    /// (`[B, levels * 4, WINDOW, Y]`) and the marks of start and end (`[B, 2 * 4, WINDOW, Y]`).
+    pub fn forward(&self, prior_stem: &Tensor, prior: &Evidence, swept: &Tensor, marks: &Tensor) -> Pushed {
+        let stem = prior_stem + swept.apply(&self.stem_swept) + marks.apply(&self.stem_marks);
+        let features = self.unet.forward(&stem.relu());
+        let occupancy = features
+            .apply(&self.occupancy_head)
+            .addcmul(&self.keep_occupancy, &prior.occupancy)
+            .addcmul(&self.swept, &Tensor::cat(&[swept, swept], 1));
+        let mixed = (features.apply(&self.semantic_mix) + prior.semantics.apply(&self.semantic_prior)).relu_();
+        let inner = mixed.apply(&self.semantic_inner).relu_() + mixed;
+        let semantics = inner.apply(&self.semantic_head).addcmul(&self.keep_semantics, &prior.semantics);
+        let change = features.apply(&self.change_inner).relu_().apply(&self.change_head);
+        Pushed { occupancy, semantics, change }
+    }
+}

@@ -1,0 +1,180 @@
+//! The networks as a belief update.
+//!
+//! Observations go through sigma_o. Pushes go through sigma_m where its weights are there; where they are not, the
+//! classical rule predicts them, on the belief that sigma_o made.
+
+use super::layout::{LABELS, Layout, Mirror, OCCUPANCY, SEMANTICS};
+use super::observe_net::{Evidence, ObserveConfig, ObserveNet};
+use super::predict::predict;
+use super::push_net::{PushConfig, PushNet};
+use super::weights::{self, Card};
+use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
+use crate::belief::{Belief, BeliefUpdate, Classical, PushPrediction, SweptPush};
+use crate::camera::MapObservation;
+use crate::grid::Grid;
+use crate::{Error, Result};
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tch::nn::VarStore;
+use tch::{Device, Kind, Tensor};
+
+/// sigma_o and sigma_m with their weights; `cnabu` in episodes.
+#[derive(Debug)]
+pub struct Cnabu {
+    // libtorch's tensors may be sent to another thread but not be used by two at once.
+    networks: Mutex<Networks>,
+    card: Card,
+}
+
+#[derive(Debug)]
+struct Networks {
+    observe: ObserveNet,
+    push: Option<PushNet>,
+    /// They hold the variables, and say on which device.
+    stores: Vec<VarStore>,
+}
+
+impl Networks {
+    fn device(&self) -> Device {
+        self.stores.first().map_or(Device::Cpu, VarStore::device)
+    }
+}
+
+impl Cnabu {
+    /// Loads the weights of a models directory, onto the device that [`DEVICE_ENV`](super::DEVICE_ENV) names or, if it is
+    /// not set, a CUDA device if libtorch has one.
+    ///
+    /// # Errors
+    /// For weights that are missing (those of sigma_m may), damaged, not finite, or of another grid, class list or version.
+    pub fn load(directory: &Path) -> Result<Self> {
+        let update = Self::load_file(&directory.join(OBSERVE_WEIGHTS))?;
+        let push = directory.join(PUSH_WEIGHTS);
+        if push.is_file() { update.with_push_file(&push) } else { Ok(update) }
+    }
+
+    /// Loads sigma_o from its file.
+    ///
+    /// # Errors
+    /// As [`Cnabu::load`].
+    pub fn load_file(path: &Path) -> Result<Self> {
+        if !path.is_file() {
+            return Err(Error::input(path, "", "there are no weights here (nudge train observe makes them)"));
+        }
+        let card = Card::read(path, "sigma_o")?;
+        let store = VarStore::new(super::chosen_device()?);
+        let net = ObserveNet::new(&store.root(), ObserveConfig { width: card.width });
+        weights::fill(&store, &weights::read_tensors(path)?, path)?;
+        Ok(Self::of(net, store, card))
+    }
+
+    /// The same with sigma_m from its file.
+    ///
+    /// # Errors
+    /// As [`Cnabu::load`].
+    pub fn with_push_file(self, path: &Path) -> Result<Self> {
+        let card = Card::read(path, "sigma_m")?;
+        let store = VarStore::new(self.device());
+        let net = PushNet::new(&store.root(), PushConfig { width: card.width });
+        weights::fill(&store, &weights::read_tensors(path)?, path)?;
+        Ok(self.with_push(net, store))
+    }
+
+    /// A belief update of a sigma_o at hand.
+    pub fn of(net: ObserveNet, store: VarStore, card: Card) -> Self {
+        Self { networks: Mutex::new(Networks { observe: net, push: None, stores: vec![store] }), card }
+    }
+
+    /// The same with a sigma_m at hand.
+    pub fn with_push(self, net: PushNet, store: VarStore) -> Self {
+        {
+            let mut networks = self.networks();
+            networks.push = Some(net);
+            networks.stores.push(store);
+        }
+        self
+    }
+
+    /// The card of sigma_o's weights.
+    pub fn card(&self) -> &Card {
+        &self.card
+    }
+
+    /// The device that the networks are on.
+    pub fn device(&self) -> Device {
+        self.networks().device()
+    }
+
+    fn networks(&self) -> MutexGuard<'_, Networks> {
+        self.networks.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// sigma_o on planes: posterior evidence from prior evidence, levels observed and one-hot labels.
+    pub(crate) fn observe_planes(&self, prior: &Evidence, observed: &Tensor, labels: &Tensor) -> Evidence {
+        let networks = self.networks();
+        let device = networks.device();
+        tch::no_grad(|| {
+            let (occupancy, semantics) =
+                networks.observe.forward(prior, &observed.to_device(device), &labels.to_device(device));
+            Evidence::of_heads(&occupancy, &semantics)
+        })
+    }
+
+    /// A belief's evidence as planes on the networks' device.
+    pub(crate) fn planes_of(&self, layout: &Layout, belief: &Belief) -> Evidence {
+        let plane = layout.plane();
+        let (mut occupancy, mut semantics) = (vec![0.0; 2 * OCCUPANCY * plane], vec![0.0; SEMANTICS * plane]);
+        layout.put_belief(belief, &mut occupancy, &mut semantics);
+        let device = self.device();
+        let tensor =
+            |planes: &[f32], channels| Tensor::from_slice(planes).reshape(layout.shape(channels)).to_device(device);
+        Evidence { occupancy: tensor(&occupancy, 2 * OCCUPANCY), semantics: tensor(&semantics, SEMANTICS) }
+    }
+}
+
+/// The belief of planes of evidence's logarithms.
+pub(crate) fn belief_of(layout: &Layout, evidence: &Evidence) -> Belief {
+    let values = |logs: &Tensor| {
+        let mut out = vec![0.0_f32; logs.numel()];
+        logs.exp().to_device(Device::Cpu).to_kind(Kind::Float).contiguous().copy_data(&mut out, logs.numel());
+        out
+    };
+    layout.belief(&values(&evidence.occupancy), &values(&evidence.semantics))
+}
+
+/// What an observation looks like to sigma_o: levels and labels.
+pub(crate) fn observation_planes(layout: &Layout, observation: &MapObservation, mirror: Mirror) -> (Tensor, Tensor) {
+    let plane = layout.plane();
+    let (mut observed, mut labels) = (vec![0.0; 2 * OCCUPANCY * plane], vec![0.0; LABELS * plane]);
+    layout.put_observed(observation, mirror, &mut observed);
+    layout.put_labels(&observation.labels, mirror, &mut labels);
+    let tensor = |planes: &[f32], channels| Tensor::from_slice(planes).reshape(layout.shape(channels));
+    (tensor(&observed, 2 * OCCUPANCY), tensor(&labels, LABELS))
+}
+
+impl BeliefUpdate for Cnabu {
+    fn name(&self) -> &str {
+        "cnabu"
+    }
+
+    fn check_grid(&self, grid: &Grid) -> Result<()> {
+        Layout::new(grid).map(|_| ())
+    }
+
+    /// A grid of other voxels than the networks' ([`BeliefUpdate::check_grid`] refuses it) is updated classically.
+    fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief {
+        let Ok(layout) = Layout::new(&belief.grid) else { return Classical.observe(belief, observation) };
+        let (observed, labels) = observation_planes(&layout, observation, Mirror::No);
+        let evidence = self.observe_planes(&self.planes_of(&layout, belief), &observed, &labels);
+        belief_of(&layout, &evidence)
+    }
+
+    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+        let Ok(layout) = Layout::new(&belief.grid) else { return Classical.predict_pushes(belief, pushes) };
+        let prior = self.planes_of(&layout, belief);
+        let networks = self.networks();
+        match &networks.push {
+            Some(net) => tch::no_grad(|| predict(net, &layout, &prior, belief, pushes, networks.device())),
+            None => Classical.predict_pushes(belief, pushes),
+        }
+    }
+}

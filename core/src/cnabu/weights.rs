@@ -1,0 +1,176 @@
+//! Weights in files: safetensors with a card beside them.
+
+use super::Scored;
+use super::layout::LEVELS;
+use crate::files::{TEMPORARY, write_atomically};
+use crate::scene::{CLASS_COUNT, Catalog};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use tch::nn::VarStore;
+use tch::{Kind, Tensor};
+
+/// Number of this kind of card and of the networks that it is about.
+const FORMAT: u32 = 1;
+
+/// What weights are: which network they are of, what they were trained on, and how well they do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Card {
+    format: u32,
+    /// `sigma_o` or `sigma_m`.
+    pub network: String,
+    /// Version of the program that trained them.
+    pub version: String,
+    /// Edge of a voxel, metres.
+    pub voxel_m: f32,
+    /// Levels of the networks.
+    pub levels: usize,
+    /// Channels of the U-Net's first level.
+    pub width: i64,
+    /// Classes by number, background last.
+    pub classes: Vec<String>,
+    /// Number of parameters.
+    pub parameters: i64,
+    /// Directory of the training data, its seed and number of samples; the validation data's.
+    #[serde(default)]
+    pub data: BTreeMap<String, String>,
+    /// The settings of the training run and how far it went.
+    #[serde(default)]
+    pub training: BTreeMap<String, String>,
+    /// Of sigma_m: scores on the floor cells that held-out pushes change, beside those of other predictions.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub pushes: BTreeMap<String, f64>,
+    /// Of sigma_o: scores on held-out scenes.
+    #[serde(default, rename = "score", skip_serializing_if = "Vec::is_empty")]
+    pub scores: Vec<Scored>,
+}
+
+impl Card {
+    /// A card of a network of this build.
+    pub fn new(network: &str, width: i64, parameters: i64) -> Self {
+        Self {
+            format: FORMAT,
+            network: network.to_owned(),
+            version: crate::VERSION.to_owned(),
+            voxel_m: 0.005,
+            levels: LEVELS,
+            width,
+            classes: class_names(),
+            parameters,
+            data: BTreeMap::new(),
+            training: BTreeMap::new(),
+            pushes: BTreeMap::new(),
+            scores: Vec::new(),
+        }
+    }
+
+    /// Reads the card beside `weights` and refuses one of another network, grid or class list.
+    pub fn read(weights: &Path, network: &str) -> Result<Self> {
+        let path = card_path(weights);
+        let text = std::fs::read_to_string(&path).map_err(|error| Error::io(&path, error))?;
+        let card: Self = toml::from_str(&text).map_err(|error| {
+            let line = error.span().map(|span| text[..span.start].lines().count().max(1));
+            Error::input(&path, line.map_or(String::new(), |line| format!("line {line}")), error.message().to_owned())
+        })?;
+        let needed = Self::new(network, card.width, card.parameters);
+        let settings = |card: &Self| {
+            [
+                ("format", card.format.to_string()),
+                ("network", card.network.clone()),
+                ("voxel_m", card.voxel_m.to_string()),
+                ("levels", card.levels.to_string()),
+                ("classes", card.classes.join(" ")),
+            ]
+        };
+        for ((name, here), (_, wanted)) in settings(&card).into_iter().zip(settings(&needed)) {
+            if here != wanted {
+                return Err(Error::input(&path, name, format!("is {here}; this program needs {wanted}")));
+            }
+        }
+        if card.width % 8 != 0 || !(8..=512).contains(&card.width) {
+            return Err(Error::input(
+                &path,
+                "width",
+                format!("is {}; a multiple of 8 up to 512 is needed", card.width),
+            ));
+        }
+        Ok(card)
+    }
+
+    /// Writes the card beside `weights`.
+    pub fn write(&self, weights: &Path) -> Result<()> {
+        let path = card_path(weights);
+        let text = toml::to_string(self).map_err(|error| Error::input(&path, "", error.to_string()))?;
+        write_atomically(&path, text.as_bytes())
+    }
+}
+
+/// The card's file beside weights.
+pub fn card_path(weights: &Path) -> PathBuf {
+    weights.with_extension("toml")
+}
+
+/// The classes' names by number, background last.
+fn class_names() -> Vec<String> {
+    let catalog = Catalog::standard();
+    let names: Vec<String> =
+        catalog.classes.iter().map(|class| class.name.clone()).chain(["background".into()]).collect();
+    debug_assert_eq!(names.len(), CLASS_COUNT);
+    names
+}
+
+/// Writes named tensors to `path`, whole or not at all.
+///
+/// # Errors
+/// When the disk does not take them; what was at `path` is still there then.
+pub fn write_tensors(path: &Path, tensors: &[(String, Tensor)]) -> Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let temporary = path.with_file_name(format!("{TEMPORARY}{name}"));
+    let written = Tensor::write_safetensors(tensors, &temporary)
+        .map_err(|error| Error::input(path, "", format!("cannot be written: {error}")))
+        .and_then(|()| std::fs::rename(&temporary, path).map_err(|error| Error::io(path, error)));
+    if written.is_err() {
+        let _ = std::fs::remove_file(&temporary);
+    }
+    written
+}
+
+/// Reads named tensors, and refuses a file that is damaged.
+///
+/// # Errors
+/// For a file that is missing, truncated or no safetensors.
+pub fn read_tensors(path: &Path) -> Result<BTreeMap<String, Tensor>> {
+    if let Err(error) = std::fs::metadata(path) {
+        return Err(Error::io(path, error));
+    }
+    let tensors = Tensor::read_safetensors(path)
+        .map_err(|error| Error::input(path, "", format!("is damaged or no safetensors file: {}", one_line(&error))))?;
+    Ok(tensors.into_iter().collect())
+}
+
+fn one_line(error: &tch::TchError) -> String {
+    error.to_string().lines().next().unwrap_or_default().to_owned()
+}
+
+/// Copies tensors into the variables of a network; all must be there, of the right shape, and finite.
+pub(crate) fn fill(store: &VarStore, tensors: &BTreeMap<String, Tensor>, path: &Path) -> Result<()> {
+    let variables: BTreeMap<String, Tensor> = store.variables().into_iter().collect();
+    for (name, variable) in &variables {
+        let tensor = tensors.get(name).ok_or_else(|| Error::input(path, name.as_str(), "is missing"))?;
+        if tensor.size() != variable.size() {
+            let message = format!("has shape {:?}, the network {:?}", tensor.size(), variable.size());
+            return Err(Error::input(path, name.as_str(), message));
+        }
+        let single = tensor.to_kind(Kind::Float);
+        if !single.isfinite().all().int64_value(&[]).eq(&1) {
+            return Err(Error::input(path, name.as_str(), "holds numbers that are not finite"));
+        }
+        tch::no_grad(|| variable.shallow_clone().copy_(&single));
+    }
+    if let Some(name) = tensors.keys().find(|name| !variables.contains_key(*name)) {
+        return Err(Error::input(path, name.as_str(), "is no variable of this network"));
+    }
+    Ok(())
+}

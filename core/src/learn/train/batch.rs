@@ -1,0 +1,76 @@
+//! Samples as tensors in the network's layout.
+
+use crate::Result;
+use crate::cnabu::{Layout, Mirror};
+use crate::learn::{Dataset, MapSample};
+use crate::rng::ChaCha8Rng;
+use crate::scene::CLASS_COUNT;
+use rand::Rng;
+use rayon::prelude::*;
+use tch::Tensor;
+
+/// Sub-cells of a pixel.
+const SUBS: usize = 4;
+
+/// A few samples, some of them mirrored.
+pub(super) struct Batch<'a> {
+    layout: &'a Layout,
+    samples: Vec<(MapSample, Mirror)>,
+}
+
+impl<'a> Batch<'a> {
+    /// Draws samples and whether they are mirrored.
+    pub(super) fn draw(
+        data: &Dataset<MapSample>,
+        layout: &'a Layout,
+        count: usize,
+        rng: &mut ChaCha8Rng,
+    ) -> Result<Self> {
+        let drawn: Vec<(usize, Mirror)> = (0..count)
+            .map(|_| (rng.random_range(0..data.len()), if rng.random() { Mirror::X } else { Mirror::No }))
+            .collect();
+        let samples = drawn.into_par_iter().map(|(at, mirror)| Ok((data.get(at)?, mirror)));
+        Ok(Self { layout, samples: samples.collect::<Result<_>>()? })
+    }
+
+    /// `[B, channels, X, Y]`, filled sample by sample.
+    fn tensor<T: tch::kind::Element + Default + Clone + Send>(
+        &self,
+        channels: usize,
+        fill: impl Fn(&MapSample, Mirror, &mut [T]) + Sync,
+    ) -> Tensor {
+        let size = channels * self.layout.plane();
+        let mut planes = vec![T::default(); size * self.samples.len()];
+        let samples = self.samples.par_iter();
+        planes.par_chunks_mut(size).zip(samples).for_each(|(out, (sample, mirror))| fill(sample, *mirror, out));
+        let [x, y] = self.layout.pixels();
+        Tensor::from_slice(&planes).reshape([self.samples.len() as i64, channels as i64, x as i64, y as i64])
+    }
+
+    /// Share of occupied voxels per level.
+    pub(super) fn truth(&self) -> Tensor {
+        let levels = crate::cnabu::LEVELS * SUBS;
+        self.tensor(levels, |sample, mirror, out: &mut [f32]| {
+            self.layout.put_set(&sample.truth, mirror, self.layout.whole(), out);
+        })
+    }
+
+    /// True class numbers, `[B, 1, 4, X, Y]`.
+    pub(super) fn classes(&self) -> Tensor {
+        let classes = self.tensor(SUBS, |sample, mirror, out: &mut [i64]| {
+            self.layout.put_classes(&sample.labels, mirror, self.layout.whole(), out);
+        });
+        classes.unsqueeze(1)
+    }
+
+    /// What view number `view` of every sample saw: levels and labels.
+    pub(super) fn view(&self, view: usize) -> (Tensor, Tensor) {
+        let observed = self.tensor(2 * crate::cnabu::LEVELS * SUBS, |sample, mirror, out: &mut [f32]| {
+            self.layout.put_observed(&sample.views[view].observation, mirror, out);
+        });
+        let labels = self.tensor((CLASS_COUNT + 1) * SUBS, |sample, mirror, out: &mut [f32]| {
+            self.layout.put_labels(&sample.views[view].observation.labels, mirror, out);
+        });
+        (observed, labels)
+    }
+}

@@ -1,0 +1,212 @@
+use super::*;
+use crate::belief::Classical;
+use crate::camera::ViewArray;
+use crate::learn::{Card as DataCard, Job, Kind as DataKind, Recipe, evaluate, make};
+use crate::scene::{Catalog, GenerateConfig};
+use std::path::Path;
+
+fn recipe() -> Recipe {
+    Recipe {
+        catalog: Catalog::standard(),
+        scenes: GenerateConfig::default(),
+        pusher: crate::arm::Pusher::default(),
+        views: ViewArray::named("standard300").expect("shipped"),
+        noise_share: 0.0,
+    }
+}
+
+/// Makes `count` map samples in a temporary directory.
+fn data(count: usize) -> (tempfile::TempDir, Dataset<MapSample>) {
+    let recipe = recipe();
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let card = DataCard::new(DataKind::Maps, &recipe, 5, count);
+    make::<MapSample>(&card, &recipe, directory.path(), Job::default(), &|_| ()).expect("made");
+    let data = Dataset::open(directory.path()).expect("opened");
+    (directory, data)
+}
+
+fn small() -> TrainSettings {
+    TrainSettings { width: 8, batch: 2, max_views: 3, ..TrainSettings::default() }
+}
+
+fn trainer(settings: TrainSettings, data: &Dataset<MapSample>) -> Trainer {
+    Trainer::new(settings, Layout::new(&data.grid()).expect("5 mm"), Device::Cpu).expect("settings in range")
+}
+
+fn run(trainer: &mut Trainer, data: &Dataset<MapSample>, batches: usize) -> Vec<ViewLoss> {
+    (0..batches).flat_map(|_| trainer.train(data, 1.0).expect("trained")).collect()
+}
+
+#[test]
+fn a_resumed_run_is_the_run_that_was_not_stopped() {
+    let (directory, data) = data(3);
+    let out = directory.path().join("run");
+    let mut whole = trainer(small(), &data);
+    run(&mut whole, &data, 3);
+    whole.save(&out).expect("saved");
+    let mut resumed =
+        Trainer::resume(&out, small(), Layout::new(&data.grid()).expect("5 mm"), Device::Cpu).expect("resumed");
+    assert_eq!((resumed.updates(), resumed.batches()), (whole.updates(), whole.batches()));
+    assert_eq!(run(&mut resumed, &data, 3), run(&mut whole, &data, 3));
+    for ((name, a), (_, b)) in resumed.state.variables.iter().zip(&whole.state.variables) {
+        assert!(a.equal(b), "{name}");
+    }
+}
+
+#[test]
+fn a_run_with_other_settings_or_a_damaged_checkpoint_is_refused() {
+    let (directory, data) = data(1);
+    let out = directory.path().join("run");
+    let layout = Layout::new(&data.grid()).expect("5 mm");
+    trainer(small(), &data).save(&out).expect("saved");
+    let other = TrainSettings { learning_rate: 5e-4, ..small() };
+    let error = Trainer::resume(&out, other, layout, Device::Cpu).expect_err("refused").to_string();
+    assert!(error.contains("run.toml: learning_rate: is 0.001 in this run, not 0.0005"), "{error}");
+    let path = checkpoint_path(&out);
+    let whole = std::fs::read(&path).expect("read");
+    std::fs::write(&path, &whole[..whole.len() / 2]).expect("written");
+    let error = Trainer::resume(&out, small(), layout, Device::Cpu).expect_err("refused").to_string();
+    assert!(error.contains("run.safetensors") && error.contains("damaged") && !error.contains('\n'), "{error}");
+}
+
+#[test]
+fn a_checkpoint_that_cannot_be_written_leaves_the_last_one() {
+    let (directory, data) = data(1);
+    let out = directory.path().join("run");
+    let trainer = trainer(small(), &data);
+    trainer.save(&out).expect("saved");
+    let before = std::fs::read(checkpoint_path(&out)).expect("read");
+    // A directory in the temporary file's place stops the write as a full disk would.
+    std::fs::create_dir(directory.path().join(".partial-run.safetensors")).expect("made");
+    assert!(trainer.save(&out).is_err());
+    assert_eq!(std::fs::read(checkpoint_path(&out)).expect("read"), before);
+}
+
+#[test]
+fn one_and_two_threads_give_losses_within_tolerance() {
+    let (_directory, data) = data(2);
+    let losses = |threads| {
+        tch::set_num_threads(threads);
+        run(&mut trainer(small(), &data), &data, 4)
+    };
+    let (one, two) = (losses(1), losses(2));
+    for (one, two) in one.iter().zip(&two) {
+        assert!((one.occupancy - two.occupancy).abs() < 1e-3 && (one.semantics - two.semantics).abs() < 5e-3);
+    }
+}
+
+#[test]
+#[ignore = "trains for several minutes; make test-cnabu runs it"]
+fn a_network_overfits_four_scenes() {
+    let (_directory, data) = data(4);
+    let settings =
+        TrainSettings { batch: 4, learning_rate: 2e-3, kl_weight: 0.0, mean_decay: 0.9, ..TrainSettings::default() };
+    let mut trainer = trainer(settings, &data);
+    let mut iou = 0.0;
+    for round in 0..30 {
+        run(&mut trainer, &data, 10);
+        let tallies = evaluate(&data, &trainer.update(), &mut |_| ()).expect("evaluated");
+        iou = tallies[VIEWS - 1].scores().occupancy_iou;
+        println!("round {round}: IoU {iou:.4}");
+        if iou > 0.98 {
+            break;
+        }
+    }
+    let classical = evaluate(&data, &Classical, &mut |_| ()).expect("evaluated")[VIEWS - 1].scores().occupancy_iou;
+    assert!(iou > 0.98 && iou > classical, "{iou}, classical {classical}");
+}
+
+#[test]
+fn weights_go_to_a_file_and_come_back_and_bad_ones_are_told() {
+    let (directory, data) = data(1);
+    let trainer = trainer(small(), &data);
+    let path = directory.path().join("sigma_o.safetensors");
+    let card = Card::new("sigma_o", 8, trainer.parameters());
+    let weights = trainer.mean_weights();
+    crate::cnabu::write_tensors(&path, &weights).expect("written");
+    card.write(&path).expect("written");
+    let sample = data.get(0).expect("read");
+    let observed = |update: &Cnabu| {
+        use crate::belief::BeliefUpdate;
+        update.observe(&crate::belief::Belief::uniform(data.grid()), &sample.views[0].observation)
+    };
+    let loaded = Cnabu::load_file(&path).expect("loaded");
+    assert_eq!(observed(&loaded), observed(&trainer.update()));
+
+    let refused = |path: &Path, wanted: &str| {
+        let error = Cnabu::load_file(path).expect_err(wanted).to_string();
+        assert!(error.contains(wanted) && !error.contains('\n'), "{error}");
+    };
+    refused(&directory.path().join("nowhere.safetensors"), "no weights");
+    let mut other = weights.iter().map(|(name, tensor)| (name.clone(), tensor.copy())).collect::<Vec<_>>();
+    tch::no_grad(|| {
+        let _ = other[3].1.fill_(f64::NAN);
+    });
+    crate::cnabu::write_tensors(&path, &other).expect("written");
+    refused(&path, "not finite");
+    drop(other.remove(3));
+    crate::cnabu::write_tensors(&path, &other).expect("written");
+    refused(&path, "is missing");
+    std::fs::write(&path, b"no weights at all").expect("written");
+    refused(&path, "damaged");
+    let text = std::fs::read_to_string(crate::cnabu::card_path(&path)).expect("read");
+    for (from, to, wanted) in [
+        ("voxel_m = 0.005", "voxel_m = 0.01", "voxel_m: is 0.01"),
+        ("\"chips_can\"", "\"teapot\"", "classes: is"),
+        ("format = 1", "format = 7", "format: is 7"),
+        ("sigma_o", "sigma_m", "network: is sigma_m"),
+    ] {
+        std::fs::write(crate::cnabu::card_path(&path), text.replacen(from, to, 1)).expect("written");
+        refused(&path, wanted);
+    }
+}
+
+#[test]
+fn sigma_m_learns_what_a_push_does_and_predicts_inside_its_window() {
+    use crate::belief::{Belief, BeliefUpdate};
+    use crate::learn::PushSample;
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let card = DataCard::new(DataKind::Pushes, &recipe(), 6, 2);
+    make::<PushSample>(&card, &recipe(), directory.path(), Job::default(), &|_| ()).expect("made");
+    let data = Dataset::<PushSample>::open(directory.path()).expect("opened");
+    let layout = Layout::new(&data.grid()).expect("5 mm");
+    let observe = Trainer::new(small(), layout, Device::Cpu).expect("settings in range").update();
+    let settings = TrainSettings { learning_rate: 3e-3, ..small() };
+    let mut trainer = PushTrainer::new(settings.clone(), layout, Device::Cpu).expect("settings in range");
+    let total = |loss: PushLoss| loss.occupancy + loss.semantics + loss.change;
+    let losses: Vec<f64> = (0..60).map(|_| total(trainer.train(&data, &observe, 1.0).expect("trained"))).collect();
+    let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
+    assert!(mean(&losses[50..]) < 0.7 * mean(&losses[..5]), "{losses:?}");
+
+    let out = directory.path().join("run");
+    trainer.save(&out).expect("saved");
+    let mut resumed = PushTrainer::resume(&out, settings, layout, Device::Cpu).expect("resumed");
+    let next = |trainer: &mut PushTrainer| trainer.train(&data, &observe, 1.0).expect("trained");
+    assert_eq!(next(&mut resumed), next(&mut trainer));
+
+    let sample = data.get(0).expect("read");
+    let mut belief = Belief::uniform(data.grid());
+    for view in &sample.views {
+        belief = observe.observe(&belief, &view.observation);
+    }
+    let update = trainer.with(observe);
+    let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
+    for (prediction, push) in update.predict_pushes(&belief, &pushes).iter().zip(&pushes) {
+        let window = prediction.window;
+        assert_eq!(prediction.change.len(), window.cell_count());
+        assert_eq!(prediction.occupancy.len(), window.cell_count() * data.grid().dims[2]);
+        assert!(prediction.change.iter().all(|p| (0.0..=1.0).contains(p)));
+        assert!(prediction.occupancy.as_flattened().iter().all(|a| a.is_finite() && *a >= 1.0));
+        let middle = push.push.start_point() + push.push.direction() * (0.5 * push.push.length_m);
+        let cell = data.grid().cell_at(middle).expect("on the board");
+        let reach = 41;
+        let x = usize::from(cell.x);
+        assert!(window.x[0] + reach > x && window.x[1] <= x + reach, "{window:?} around {x}");
+        let mut after = belief.clone();
+        after.apply(prediction);
+        for (at, cell) in window.cells(&data.grid()).enumerate() {
+            let same = after.occupancy[data.grid().column(cell)] == belief.occupancy[data.grid().column(cell)];
+            assert!(same || prediction.change[at] > 0.0);
+        }
+    }
+}

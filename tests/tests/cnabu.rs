@@ -1,0 +1,116 @@
+//! The networks from the command line: training, resuming, weights, and what is refused. Needs a binary built with the
+//! feature `cnabu` (make test-cnabu).
+
+use nudge_tests::{nudge_bin, nudge_fails, nudge_ok, root, text};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+fn utf8(path: &Path) -> &str {
+    path.to_str().expect("utf-8")
+}
+
+/// A folder with 50 map samples in `d`.
+fn with_data() -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let data = dir.path().join("d");
+    nudge_ok(&["data", "maps", "--count", "50", "--seed", "9", "--out", utf8(&data)]);
+    (dir, data)
+}
+
+/// Runs `nudge` with weights from `models`.
+fn nudge_with(models: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(nudge_bin());
+    command.args(args).current_dir(root()).env("NUDGE_MODELS", models).env_remove("LD_LIBRARY_PATH");
+    command.output().expect("nudge starts")
+}
+
+fn losses(curve: &Path) -> Vec<Value> {
+    let text = std::fs::read_to_string(curve).expect("a curve");
+    text.lines()
+        .map(|line| serde_json::from_str(line).expect("a JSON line"))
+        .filter(|l: &Value| l["kind"] == "loss")
+        .collect()
+}
+
+#[test]
+fn training_runs_and_the_loss_falls_and_resuming_goes_on() {
+    let (dir, data) = with_data();
+    let (one, two) = (dir.path().join("one"), dir.path().join("two"));
+    let train = |out: &Path, updates: &str, more: &[&str]| {
+        let mut args = vec!["train", "observe", "--data", utf8(&data), "--out", utf8(out), "--updates", updates];
+        args.extend(["--width", "16", "--batch", "2", "--threads", "1", "--max-views", "1"]);
+        args.extend(more);
+        nudge_ok(&args)
+    };
+    train(&one, "40", &[]);
+    train(&one, "160", &["--resume"]);
+    train(&two, "160", &[]);
+    let bytes = |run: &Path| std::fs::read(run.with_extension("safetensors")).expect("a checkpoint");
+    assert!(bytes(&one) == bytes(&two), "a resumed run is the run that was not stopped");
+    let curve = losses(&one.with_extension("jsonl"));
+    let total = |line: &Value| line["occupancy"].as_f64().expect("loss") + line["semantics"].as_f64().expect("loss");
+    let (first, last) = (total(&curve[0]), total(&curve[curve.len() - 1]));
+    assert!(last < 0.9 * first, "{first} to {last}");
+
+    let line = nudge_fails(2, &["train", "observe", "--data", utf8(&data), "--out", utf8(&one)]);
+    assert!(line.contains("is there already"), "{line}");
+    let other = ["train", "observe", "--data", utf8(&data), "--out", utf8(&one), "--resume", "--batch", "3"];
+    let line = nudge_fails(2, &other);
+    assert!(line.contains("one.toml") && line.contains("batch") || line.contains("width"), "{line}");
+    let nowhere = dir.path().join("nowhere");
+    let line = nudge_fails(2, &["train", "observe", "--data", utf8(&nowhere), "--out", utf8(&two)]);
+    assert!(line.contains("nowhere"), "{line}");
+
+    // The checkpoint becomes weights, and an episode runs on them; damaged weights are told.
+    let models = dir.path().join("models");
+    let weights = models.join("sigma_o.safetensors");
+    nudge_ok(&[
+        "train",
+        "export",
+        "observe",
+        utf8(&one),
+        "--test",
+        utf8(&data),
+        "--scenes",
+        "1",
+        "--out",
+        utf8(&models),
+        "--half",
+    ]);
+    let out = dir.path().join("episode");
+    let scene = "scenes/demo/first-look.toml";
+    let run = |more: &[&str]| {
+        let mut args =
+            vec!["run", scene, "--policy", "random-cnabu", "--budget", "2", "--force", "--json", "--out", utf8(&out)];
+        args.extend(more);
+        nudge_with(&models, &args)
+    };
+    let said = run(&[]);
+    assert!(said.status.success() && said.stderr.is_empty(), "{}", text(&said.stderr));
+    let record: Value = serde_json::from_str(&text(&said.stdout)).expect("JSON");
+    assert_eq!(record["belief"], "cnabu");
+    let said = nudge_with(&models, &["replay", utf8(&out)]);
+    assert!(text(&said.stdout).contains("bit for bit"), "{} {}", text(&said.stdout), text(&said.stderr));
+    let whole = std::fs::read(&weights).expect("read");
+    std::fs::write(&weights, &whole[..whole.len() / 3]).expect("written");
+    let said = run(&[]);
+    let error = text(&said.stderr);
+    assert!(
+        said.status.code() == Some(2) && error.contains("sigma_o.safetensors") && error.lines().count() == 1,
+        "{error}"
+    );
+}
+
+#[test]
+fn without_weights_the_classical_update_stands_in_and_asking_for_networks_is_refused() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("episode");
+    let args = ["run", "scenes/demo/first-look.toml", "--budget", "1", "--json", "--out", utf8(&out)];
+    let nothing = dir.path().join("no-models");
+    let said = nudge_with(&nothing, &args);
+    assert_eq!(said.status.code(), Some(2), "a models directory that was named must be there");
+    assert!(text(&said.stderr).contains("no-models"), "{}", text(&said.stderr));
+    let line = nudge_fails(2, &["calibrate", "--data", utf8(&nothing), "--models", utf8(&nothing)]);
+    assert!(line.contains("no-models"), "{line}");
+}

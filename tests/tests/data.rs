@@ -1,0 +1,91 @@
+//! Training data from the command line: made, resumed, shared between processes, read from Python; and bad directories.
+
+use nudge_tests::{nudge, nudge_fails, nudge_ok, root, text, venv_tool};
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+fn make(kind: &str, out: &Path, count: usize, more: &[&str]) -> Value {
+    let (out, count) = (out.to_str().expect("utf-8"), count.to_string());
+    let mut args = vec!["data", kind, "--count", &count, "--seed", "9", "--out", out, "--json"];
+    args.extend(more);
+    serde_json::from_str(&nudge_ok(&args)).expect("JSON on stdout")
+}
+
+#[test]
+fn maps_repeat_extend_and_stay_small() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (one, two) = (dir.path().join("one"), dir.path().join("two"));
+    let made = make("maps", &one, 2, &[]);
+    assert_eq!((made["samples"].as_u64(), made["made"].as_u64()), (Some(2), Some(2)));
+    assert!(made["bytes_per_sample"].as_f64().expect("bytes") < 200_000.0);
+    assert_eq!(make("maps", &one, 2, &[])["made"].as_u64(), Some(0), "what is there is not made again");
+    make("maps", &two, 2, &[]);
+    let shard = |dir: &Path| std::fs::read(dir.join("shard-00000.zst")).expect("a shard");
+    assert_eq!(shard(&one), shard(&two));
+    // A shard of another length is made anew: the same samples first.
+    assert_eq!(make("maps", &one, 3, &[])["made"].as_u64(), Some(3));
+    assert!(shard(&one).starts_with(&shard(&two)));
+    let line = nudge_fails(2, &["data", "maps", "--count", "3", "--seed", "8", "--out", one.to_str().expect("utf-8")]);
+    assert!(line.contains("seed 9, not 8"), "{line}");
+    let line =
+        nudge_fails(2, &["data", "pushes", "--count", "3", "--seed", "9", "--out", one.to_str().expect("utf-8")]);
+    assert!(line.contains("kind maps, not pushes"), "{line}");
+}
+
+#[test]
+fn pushes_are_made_and_small() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let made = make("pushes", &dir.path().join("p"), 2, &[]);
+    assert_eq!(made["samples"].as_u64(), Some(2));
+    assert!(made["bytes_per_sample"].as_f64().expect("bytes") < 200_000.0);
+}
+
+#[test]
+fn python_reads_maps() {
+    let Some(python) = venv_tool("python") else { return };
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("d");
+    make("maps", &out, 2, &["--noise", "0"]);
+    let script = root().join("scripts/read_data.py");
+    let said = Command::new(python).arg(script).arg(&out).output().expect("python starts");
+    let (lines, errors) = (text(&said.stdout), text(&said.stderr));
+    assert!(said.status.success(), "{errors}");
+    assert_eq!(lines.lines().count(), 2, "{lines}");
+    for line in lines.lines() {
+        let share: f64 = line.split(' ').nth(2).and_then(|word| word.parse().ok()).expect("a share");
+        assert!((0.05..0.30).contains(&share), "{line}");
+    }
+}
+
+#[test]
+fn a_damaged_shard_is_skipped_and_named_and_a_directory_without_data_is_refused() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("d");
+    make("maps", &out, 51, &[]);
+    let shard = out.join("shard-00001.zst");
+    let mut bytes = std::fs::read(&shard).expect("read");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x40;
+    std::fs::write(&shard, &bytes).expect("written");
+    let out = out.to_str().expect("utf-8");
+    let said = nudge(&["calibrate", "--data", out, "--scenes", "1", "--beliefs", "classical"]);
+    assert!(said.status.success(), "{}", text(&said.stderr));
+    let warning = text(&said.stderr);
+    assert!(
+        warning.contains("skipped") && warning.contains("shard-00001.zst") && warning.contains("checksum"),
+        "{warning}"
+    );
+    // Making again repairs it.
+    let made: Value =
+        serde_json::from_str(&nudge_ok(&["data", "maps", "--count", "51", "--seed", "9", "--out", out, "--json"]))
+            .expect("JSON on stdout");
+    assert_eq!((made["samples"].as_u64(), made["made"].as_u64()), (Some(51), Some(1)));
+
+    let empty = dir.path().join("empty");
+    std::fs::create_dir(&empty).expect("made");
+    let line = nudge_fails(2, &["calibrate", "--data", empty.to_str().expect("utf-8"), "--beliefs", "classical"]);
+    assert!(line.contains("empty") && line.contains("no data"), "{line}");
+    let line = nudge_fails(2, &["data", "maps", "--count", "2", "--shard", "3/3", "--out", out]);
+    assert!(line.contains("3/3"), "{line}");
+}

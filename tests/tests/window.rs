@@ -17,7 +17,7 @@ const FAINT: u8 = 24;
 /// Episodes of two policies to look at, made once for all tests of this process.
 static EPISODES: LazyLock<(tempfile::TempDir, [PathBuf; 2])> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("folder");
-    let episodes = ["mem", "random"].map(|policy| {
+    let episodes = ["random-push-5", "random"].map(|policy| {
         let out = folder.path().join(policy);
         let path = out.to_str().expect("utf-8");
         let args = ["run", SCENE, "--belief", "classical", "--budget", "10", "--seed", "1", "--candidates", "30"];

@@ -175,6 +175,7 @@ pub fn sample_by(belief: &Belief, pusher: &Pusher, count: usize, rng: &mut ChaCh
 }
 
 /// How candidates are checked.
+#[allow(clippy::large_enum_variant, reason = "there is one of it at a time, on the stack of one call")]
 enum Check<'a> {
     Free { tool: &'a Tool, clearance: Clearance },
     Arm { tool: Tool, arm: ArmClearance<'a>, seed: u64 },

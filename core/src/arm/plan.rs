@@ -75,6 +75,7 @@ pub(super) fn is_segment_free(space: &Space<'_>, a: &Joints, b: &Joints) -> bool
 }
 
 /// The same for ends whose room is known.
+#[allow(clippy::if_same_then_else, reason = "the order in which the halves are asked is the point")]
 pub(super) fn is_span_free(space: &Space<'_>, a: &Joints, b: &Joints, room_a: f64, room_b: f64) -> bool {
     let travel = space.arm.travel_m(a, b);
     if travel <= room_a + room_b + GAP_M {

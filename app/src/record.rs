@@ -14,7 +14,7 @@ mod floor;
 pub(crate) mod layout;
 pub mod paths;
 mod remarks;
-mod robot;
+pub(crate) mod robot;
 pub(crate) mod shapes;
 #[cfg(feature = "cnabu")]
 pub mod training;

@@ -199,9 +199,9 @@ impl Situation<'_> {
 #[serde(rename_all = "snake_case")]
 pub enum PushedBy {
     /// Gripper and last links that come in straight and need no arm; every view is in reach.
-    #[default]
     Tool,
     /// The scene's arm: only what it reaches is offered.
+    #[default]
     Arm,
 }
 

@@ -16,7 +16,7 @@ pub use frontier::frontier;
 
 use crate::arm::{Hit, Obstacle, PushMotion, Pusher};
 use crate::belief::{Belief, SweptPush};
-use crate::grid::Voxel;
+use crate::grid::{Voxel, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
 use crate::tool::{Push, Tool};
 use frontier::likely_targets;
@@ -171,6 +171,20 @@ pub fn sample_by(belief: &Belief, pusher: &Pusher, count: usize, rng: &mut ChaCh
             };
             sample_checked(belief, &check, count, rng)
         }
+    }
+}
+
+/// What a push that a person thinks of would sweep: by the arm's motion for it, or in the shape of the free tool where
+/// there is no arm or it cannot carry the push out.
+pub fn swept_by(pusher: &Pusher, belief: &Belief, push: &Push) -> VoxelSet {
+    let motion = pusher.arm().and_then(|arm| {
+        let clearance = ArmClearance::new(arm, belief);
+        clearance.motion(push, &clearance.target_of(push), &mut stream(0, "push to look at", 0)).ok()
+    });
+    match (pusher, motion) {
+        (Pusher::Arm(arm), Some(motion)) => motion.swept_volume(&arm.arm, &belief.grid),
+        (Pusher::Free(tool), _) => tool.swept_volume(push, &belief.grid),
+        (Pusher::Arm(_), None) => Tool::standard().swept_volume(push, &belief.grid),
     }
 }
 

@@ -9,6 +9,7 @@ mod truth;
 pub use arm::LinkContact;
 pub use truth::TruthMap;
 
+use crate::arm::Joints;
 use crate::scene::{Body, ObjectId, Shelf};
 use crate::solid::Bounds;
 use crate::tool::{Push, Tool};
@@ -73,6 +74,8 @@ pub struct PushOutcome {
     pub arm_in_shelf_m: f32,
     /// How long the arm moved, seconds.
     pub arm_s: f32,
+    /// The configurations that the arm passed until it turned back.
+    pub passed: Vec<Joints>,
 }
 
 /// What became of the tool's way along one straight leg.

@@ -27,6 +27,9 @@ pub struct Args {
     /// The light theme
     #[arg(long)]
     light: bool,
+    /// Show the arm, so many seconds into its motion of the step before
+    #[arg(long, value_name = "SECONDS")]
+    arm: Option<f64>,
     /// The picture; of several, the layout's name is put behind the file's
     #[arg(long)]
     out: PathBuf,
@@ -75,6 +78,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         size: args.size,
         scale: args.scale,
         light: args.light,
+        arm_s: args.arm,
     };
     for (layout, picture) in shoot(&shot, out.path().to_owned())? {
         let path = match args.layout {

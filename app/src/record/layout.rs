@@ -140,6 +140,7 @@ impl Eye {
     pub(crate) const ROBOT: Self = Self { position: [1.05, -1.10, 0.85], target: [0.0, -0.22, 0.18] };
 
     /// The same look from `factor` times as far.
+    #[cfg(feature = "workbench")]
     pub(crate) fn farther(self, factor: f32) -> Self {
         let back = |axis: usize| self.target[axis] + factor * (self.position[axis] - self.target[axis]);
         Self { position: std::array::from_fn(back), ..self }
@@ -152,6 +153,7 @@ pub(crate) enum Ground {
     /// For screens.
     Dark,
     /// For print.
+    #[cfg_attr(not(feature = "workbench"), allow(dead_code, reason = "recordings are dark; the window chooses"))]
     Light,
 }
 

@@ -6,8 +6,8 @@ use nudge_core::arm::{ArmTool, Joints, Motion, Part, Role, pose_of};
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::plan::Decision;
 
-const LINK_RGB: Rgb = [150, 164, 180];
-const TOOL_RGB: Rgb = [72, 74, 80];
+pub(crate) const LINK_RGB: Rgb = [150, 164, 180];
+pub(crate) const TOOL_RGB: Rgb = [72, 74, 80];
 const REACHED_RGB: Rgb = [86, 196, 132];
 const PATH_RGB: Rgb = [120, 200, 255];
 /// Time between two poses of a motion, seconds, for motions that are not long.

@@ -9,6 +9,7 @@ use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
 use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
 use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason};
+use nudge_core::push::swept_by;
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
 use nudge_core::world::TruthMap;
 use std::path::PathBuf;
@@ -66,7 +67,9 @@ impl Script {
             catalog,
             views: Arc::new(episode.views().clone()),
             update,
-            tool: Arc::new(episode.tool().clone()),
+            pusher: episode.pusher(),
+            arm: episode.arm().clone(),
+            unreachable: Arc::new(episode.unreachable_views().to_vec()),
             hidden: Arc::new(vec!["tomato_can#1".to_owned()]),
         };
         let mut truth = Arc::new(episode.truth().clone());
@@ -162,7 +165,7 @@ pub fn answer(model: &mut Model) {
     let push =
         model.candidate.and_then(|at| session.decision_after(step)?.candidates.get(at)).map(|candidate| candidate.push);
     let preview = push.map(|push| {
-        let swept = session.setup.tool.swept_volume(&push, &belief.grid);
+        let swept = swept_by(&session.setup.pusher, &belief, &push);
         let pushes = [SweptPush { push, swept: swept.clone() }];
         let prediction = session.setup.update.predict_pushes(&belief, &pushes).remove(0);
         Preview { of: (session.id, step), push, prediction: Arc::new(prediction), swept: Arc::new(swept) }

@@ -99,6 +99,8 @@ pub struct Display {
     pub views: bool,
     /// The push candidates as arrows.
     pub pushes: bool,
+    /// The arm.
+    pub robot: bool,
 }
 
 impl Default for Display {
@@ -110,6 +112,7 @@ impl Default for Display {
             truth: true,
             views: true,
             pushes: false,
+            robot: false,
         }
     }
 }

@@ -27,6 +27,7 @@ mod causes;
 mod facts;
 mod floor;
 mod legend;
+mod motion;
 mod push_review;
 mod spark;
 mod table;
@@ -38,6 +39,7 @@ mod words;
 mod tests;
 
 use super::model::{Hovered, Model};
+use super::session::SessionId;
 use nudge_core::camera::ViewId;
 use rerun::external::egui;
 
@@ -50,6 +52,18 @@ pub struct State {
     gains: gains::State,
     push: push::State,
     compare: compare::State,
+}
+
+impl State {
+    /// How far the arm's motion of a step is scrubbed, seconds.
+    pub fn motion_s(&self, step: (SessionId, usize)) -> Option<f64> {
+        self.push.motion_s(step)
+    }
+
+    /// Moves the arm to a time in the motion of a step, seconds.
+    pub fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
+        self.push.scrub(step, at_s);
+    }
 }
 
 /// What a person did in a panel that is only about looking; it goes into the model once the panel is drawn.

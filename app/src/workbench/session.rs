@@ -2,13 +2,13 @@
 
 use super::annotations::Annotations;
 use super::half_belief::HalfBelief;
+use nudge_core::arm::{ArmTool, Pusher};
 use nudge_core::belief::BeliefUpdate;
-use nudge_core::camera::ViewArray;
+use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::{EpisodeRecord, StepOutcome};
 use nudge_core::plan::Decision;
 use nudge_core::scene::{Body, Catalog};
 use nudge_core::score::Scores;
-use nudge_core::tool::Tool;
 use nudge_core::world::TruthMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -71,8 +71,12 @@ pub struct Setup {
     pub views: Arc<ViewArray>,
     /// How beliefs change.
     pub update: Arc<dyn BeliefUpdate>,
-    /// What pushes.
-    pub tool: Arc<Tool>,
+    /// What carries pushes out.
+    pub pusher: Pusher,
+    /// The arm before the shelf.
+    pub arm: Arc<ArmTool>,
+    /// Views that its hand cannot be at.
+    pub unreachable: Arc<Vec<ViewId>>,
     /// Objects that no view saw at the start, by name.
     pub hidden: Arc<Vec<String>>,
 }

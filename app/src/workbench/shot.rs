@@ -28,6 +28,8 @@ pub struct Shot {
     pub scale: f32,
     /// Light instead of dark.
     pub light: bool,
+    /// The arm, so many seconds into the motion of the step before.
+    pub arm_s: Option<f64>,
 }
 
 /// How long a picture may take to come to rest.
@@ -69,6 +71,12 @@ pub fn shoot(shot: &Shot, out: PathBuf) -> Result<Vec<(LayoutKind, RgbImage)>> {
         lay_out(harness.state_mut(), layout);
         choose(harness.state_mut(), shot.step, layout);
         settle(&mut harness)?;
+        if let Some(at_s) = shot.arm_s {
+            let model = &mut harness.state_mut().model;
+            let step = model.session().map(|session| (session.id, model.cursor.min(session.steps())));
+            model.kept.display.robot = true;
+            step.into_iter().for_each(|step| model.panels.scrub(step, at_s));
+        }
         explain(harness.state_mut(), layout);
         settle(&mut harness)?;
         let picture = harness.render().map_err(Error::Usage)?;

@@ -4,6 +4,8 @@
 //! the viewer's. A [`Space`] says what shall be seen; [`Painter::paint`] logs the parts of it that have changed since the
 //! last one, and remembers which voxel every drawn instance is, for picking.
 
+mod arm;
+
 use super::half_belief::HalfBelief;
 use super::model::{ColourBy, Display, GainSource, Hovered, LayoutKind, Picked, Preview};
 use super::session::{Moment, SessionId, Setup};
@@ -49,6 +51,10 @@ pub mod at {
     pub const DIFFERENCE: &str = "push/difference";
     /// What it really left.
     pub const HAPPENED: &str = "push/happened";
+    /// The arm.
+    pub const ARM: &str = "robot/arm";
+    /// The way of its tip.
+    pub const ARM_PATH: &str = "robot/path";
     /// Where a gain comes from.
     pub const GAIN: &str = "gain";
     /// The belief of the second episode.
@@ -120,6 +126,16 @@ pub struct Space {
     pub preview: Option<Preview>,
     /// Where a gain comes from.
     pub gain: Option<GainSource>,
+    /// How far the arm's motion of the step is scrubbed, seconds.
+    pub motion_s: Option<f64>,
+}
+
+impl Space {
+    /// Whether the arm is in sight: where a person wants it, and while its motion is scrubbed.
+    fn shows_arm(&self) -> bool {
+        let here = matches!(self.layout, LayoutKind::Episode | LayoutKind::Why | LayoutKind::Push);
+        here && (self.display.robot || self.motion_s.is_some())
+    }
 }
 
 type VoxelsOf = BTreeMap<&'static str, Arc<Vec<usize>>>;
@@ -151,7 +167,7 @@ pub struct Painter {
     stream: RecordingStream,
     drawn: Drawn,
     /// The views that are there, how far from the shelf their eyes began, and their ground.
-    layout: Option<(LayoutKind, f32, Ground)>,
+    layout: Option<(LayoutKind, f32, Ground, bool)>,
     /// What every entity was last drawn from, as words.
     keys: BTreeMap<&'static str, String>,
     /// The last beliefs in full precision.
@@ -167,8 +183,9 @@ impl Painter {
     /// Logs what differs from the last call.
     pub fn paint(&mut self, space: &Space) {
         let ground = if space.light { Ground::Light } else { Ground::Dark };
-        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect, ground)
-            && self.layout.replace((views, distance, ground)) != Some((views, distance, ground))
+        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect, ground, space.shows_arm())
+            && self.layout.replace((views, distance, ground, space.shows_arm()))
+                != Some((views, distance, ground, space.shows_arm()))
             && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
         {
             eprintln!("warning: layout: {error}");
@@ -179,6 +196,7 @@ impl Painter {
         self.belief(side, space);
         self.cameras(side, space);
         self.pushes(side, space);
+        self.arm(side, space);
         if space.layout == LayoutKind::Push {
             self.push_views(side, space);
         }
@@ -223,13 +241,13 @@ impl Painter {
         for entity in [at::BELIEF, at::PREDICTED, at::DIFFERENCE, at::HAPPENED, at::GAIN, at::OTHER, at::BETWEEN] {
             self.log_voxels(entity, &grid, Vec::new(), |_| [0; 3]);
         }
-        for entity in [at::EDGES, at::VIEWS, at::CURRENT, at::HOVERED, at::PICKED] {
+        for entity in [at::ARM_PATH, at::EDGES, at::VIEWS, at::CURRENT, at::HOVERED, at::PICKED] {
             self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
         }
         for entity in [at::CANDIDATES, at::CHOSEN] {
             self.log(entity, &no_arrows());
         }
-        for entity in [at::SHELF, at::OBJECTS, at::OTHER_OBJECTS] {
+        for entity in [at::SHELF, at::OBJECTS, at::OTHER_OBJECTS, at::ARM] {
             self.log(entity, &nothing());
         }
         self.keys.clear();
@@ -289,6 +307,9 @@ impl Painter {
                 let range = side.decision.as_ref().map_or([0.0, 1.0], |decision| shapes::gain_range(decision));
                 let colors =
                     views.views.iter().enumerate().map(|(at, _)| match gains.and_then(|gains| gains.get(at)) {
+                        Some(_) if side.setup.unreachable.contains(&ViewId(at as u16)) => {
+                            rerun::Color::from(shapes::REJECTED_RGB)
+                        }
                         Some(gain) => rerun::Color::from(Colormap::Cividis.of(*gain, range)),
                         None => rerun::Color::from(shapes::REJECTED_RGB),
                     });

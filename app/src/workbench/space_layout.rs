@@ -17,18 +17,20 @@ fn distance(aspect: f32) -> f32 {
 }
 
 /// The views of a layout with the first layout that has the same ones, and the distance of their eyes; `None` where it
-/// has none. `aspect` is width over height of the place for all of them together.
-pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground) -> Option<(LayoutKind, f32, Layout)> {
+/// has none. `aspect` is width over height of the place for all of them together. With the robot in them they are seen
+/// from beside it, or it would stand in the way.
+pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -> Option<(LayoutKind, f32, Layout)> {
     let distance = distance(match layout {
         LayoutKind::Compare => aspect / 3.0,
         _ => aspect,
     });
+    let eye = if robot { Eye::ROBOT } else { Eye::SHELF };
     let always = [at::SHELF, at::EDGES];
     let view = |name: &str, shown: &[&str]| {
         Part::View(spatial(
             name,
             "",
-            Eye::SHELF.farther(distance),
+            eye.farther(distance),
             ground,
             always.iter().chain(shown).map(|path| format!("/{path}")).collect(),
         ))
@@ -37,7 +39,11 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground) -> Option<(Lay
     let root = match layout {
         LayoutKind::Episode | LayoutKind::Why => view(
             "Belief",
-            &[&[at::BELIEF, at::OBJECTS, at::VIEWS, at::CURRENT, at::CANDIDATES, at::CHOSEN], &pointer[..]].concat(),
+            &[
+                &[at::BELIEF, at::OBJECTS, at::VIEWS, at::CURRENT, at::CANDIDATES, at::CHOSEN, at::ARM, at::ARM_PATH],
+                &pointer[..],
+            ]
+            .concat(),
         ),
         LayoutKind::Gains => view(
             "Where the gain comes from",
@@ -49,7 +55,14 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground) -> Option<(Lay
                 Part::Row(vec![
                     (
                         1.0,
-                        view("Now", &[&[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN], &pointer[..]].concat()),
+                        view(
+                            "Now",
+                            &[
+                                &[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN, at::ARM, at::ARM_PATH],
+                                &pointer[..],
+                            ]
+                            .concat(),
+                        ),
                     ),
                     (1.0, view("Predicted", &[at::PREDICTED, at::SWEPT, at::CHOSEN])),
                 ]),

@@ -13,7 +13,6 @@ use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepOutcome, review};
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
-use nudge_core::tool::Tool;
 use nudge_core::{Error, Result};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -371,7 +370,9 @@ fn opened(path: &Path, episode: &Episode, moments: Vec<Arc<Moment>>, read_only: 
         catalog: Arc::new(episode.catalog().clone()),
         views: Arc::new(views),
         update: update_named(&record.config.belief, &record.config)?,
-        tool: Arc::new(Tool::standard()),
+        pusher: episode.pusher(),
+        arm: episode.arm().clone(),
+        unreachable: Arc::new(episode.unreachable_views().to_vec()),
         hidden: Arc::new(hidden.iter().map(name).collect()),
     };
     Ok(Opened { path: path.to_owned(), record, setup, moments, read_only })

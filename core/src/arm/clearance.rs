@@ -2,8 +2,8 @@
 
 use super::model::{Part, Role};
 use super::space::{Gripper, MAP_MARGIN_M, MapObstacles, PANELS, SHELF_MARGIN_M, Space};
-use super::{Ball, Frame, Joints};
-use nalgebra::Point3;
+use super::{Ball, BodyPoses, Frame, Joints};
+use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Room beyond this is not told apart, metres.
@@ -66,11 +66,27 @@ struct Placed {
     radius_m: f64,
 }
 
-impl Placed {
-    fn of(ball: &Ball, world_from_body: &Frame) -> Self {
-        Self { center: world_from_body * ball.center, radius_m: ball.radius_m }
+/// A body's pose in the form that is fastest for many points.
+struct Moved {
+    rotation: Matrix3<f64>,
+    translation: Vector3<f64>,
+}
+
+impl Moved {
+    fn by(world_from_body: &Frame) -> Self {
+        Self {
+            rotation: world_from_body.rotation.to_rotation_matrix().into_inner(),
+            translation: world_from_body.translation.vector,
+        }
     }
 
+    fn ball(&self, ball: &Ball) -> Placed {
+        let center = Point3::from(self.rotation * ball.center.coords + self.translation);
+        Placed { center, radius_m: ball.radius_m }
+    }
+}
+
+impl Placed {
     fn gap_m(&self, other: &Self) -> f64 {
         (self.center - other.center).norm() - self.radius_m - other.radius_m
     }
@@ -106,69 +122,96 @@ impl Space<'_> {
     /// The least room of any part, starting from `room`; `closer` hears of every part that has less than all before.
     fn measure(&self, joints: &Joints, mut room: f64, mut closer: impl FnMut(usize, Met)) -> f64 {
         let poses = self.arm.body_poses(joints);
-        for (at, (body, part)) in self.arm.parts().enumerate() {
-            let whole = Placed::of(&part.around, &poses[body]);
-            let balls = || part.balls.iter().map(|ball| Placed::of(ball, &poses[body]));
-            let mut note = |value: f64, met: Met| {
-                if value < room {
-                    room = value;
-                    closer(at, met);
-                }
-                room
-            };
-            let mut least = note(f64::INFINITY, Met::Table);
-            // The base stands on the table.
-            let above = |ball: &Placed| ball.center.z - ball.radius_m - self.table_z - SHELF_MARGIN_M;
-            if body > 0 && above(&whole) < least {
-                for ball in balls() {
-                    least = note(above(&ball), Met::Table);
-                }
-            }
-            // Most of the arm is far before the shelf most of the time.
-            let beside = |ball: &Placed, least: f64| {
-                self.outer.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M.max(SHELF_MARGIN_M) < least
-            };
-            if !beside(&whole, least) {
-                continue;
-            }
-            let map = self.map.as_ref().filter(|map| part.role == Role::Link || map.gripper == Gripper::KeepsAway);
-            for ball in balls() {
-                if !beside(&ball, least) {
-                    continue;
-                }
-                for (panel, slab) in self.panels.iter().enumerate() {
-                    let gap = slab.distance_m(&ball.center) - ball.radius_m - SHELF_MARGIN_M;
-                    least = note(gap, Met::Panel(panel));
-                }
-                if let Some(map) = map {
-                    let gap = map.field.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M;
-                    least = note(gap, Met::Map(ball.center));
-                }
-            }
+        for part in 0..self.arm.places.len() {
+            room = self.part_room(part, &poses, room, &mut |met| closer(part, met));
         }
         for &[a, b] in &self.arm.self_pairs {
-            // Both sides may move, so each may use half of the gap.
-            let ([body_a, part_a], [body_b, part_b]) =
-                (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
-            let (first, second): (&Part, &Part) = (&self.arm.bodies[body_a][part_a], &self.arm.bodies[body_b][part_b]);
-            let whole = Placed::of(&second.around, &poses[body_b]);
-            if Placed::of(&first.around, &poses[body_a]).gap_m(&whole) >= 2.0 * room {
+            let closer = &mut || closer(usize::from(a), Met::Part(usize::from(b)));
+            room = self.pair_room([a, b], &poses, room, closer);
+        }
+        room
+    }
+
+    /// How far a part (by position in [`super::Arm::parts`]) may move before it meets shelf, table or map, metres, at most
+    /// `least`; `closer` hears of everything that has less than all before.
+    pub(super) fn part_room(
+        &self,
+        part: usize,
+        poses: &BodyPoses,
+        mut least: f64,
+        closer: &mut impl FnMut(Met),
+    ) -> f64 {
+        let [body, at] = self.arm.places[part];
+        let part: &Part = &self.arm.bodies[body][at];
+        let pose = Moved::by(&poses[body]);
+        let whole = pose.ball(&part.around);
+        let mut note = |value: f64, met: Met, least: &mut f64| {
+            if value < *least {
+                *least = value;
+                closer(met);
+            }
+        };
+        // The base stands on the table.
+        let above = |ball: &Placed| ball.center.z - ball.radius_m - self.table_z - SHELF_MARGIN_M;
+        if body > 0 && above(&whole) < least {
+            part.balls.iter().for_each(|ball| note(above(&pose.ball(ball)), Met::Table, &mut least));
+        }
+        // Most of the arm is far before the shelf most of the time.
+        let beside = |ball: &Placed, least: f64| {
+            self.outer.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M.max(SHELF_MARGIN_M) < least
+        };
+        if !beside(&whole, least) {
+            return least;
+        }
+        let to_map =
+            |map: &MapObstacles<'_>, ball: &Placed| map.field.distance_m(&ball.center) - ball.radius_m - MAP_MARGIN_M;
+        let map = self.map.as_ref().filter(|map| part.role == Role::Link || map.gripper == Gripper::KeepsAway);
+        let map = map.filter(|map| to_map(map, &whole) < least);
+        for ball in part.balls.iter().map(|ball| pose.ball(ball)) {
+            if !beside(&ball, least) {
                 continue;
             }
-            for of_a in first.balls.iter().map(|ball| Placed::of(ball, &poses[body_a])) {
-                if of_a.gap_m(&whole) >= 2.0 * room {
-                    continue;
+            if self.to_panels_m(&ball.center) - ball.radius_m - SHELF_MARGIN_M < least {
+                for (panel, slab) in self.panels.iter().enumerate() {
+                    note(slab.distance_m(&ball.center) - ball.radius_m - SHELF_MARGIN_M, Met::Panel(panel), &mut least);
                 }
-                for of_b in second.balls.iter().map(|ball| Placed::of(ball, &poses[body_b])) {
-                    let value = 0.5 * (of_a.gap_m(&of_b) + OVERSHOOT_M);
-                    if value < room {
-                        room = value;
-                        closer(usize::from(a), Met::Part(usize::from(b)));
-                    }
+            }
+            if let Some(map) = map {
+                note(to_map(map, &ball), Met::Map(ball.center), &mut least);
+            }
+        }
+        least
+    }
+
+    /// How far two parts of the arm may both move before they meet, metres, at most `least`: each may use half of the gap.
+    pub(super) fn pair_room(
+        &self,
+        [a, b]: [u16; 2],
+        poses: &BodyPoses,
+        mut least: f64,
+        closer: &mut impl FnMut(),
+    ) -> f64 {
+        let ([body_a, part_a], [body_b, part_b]) = (self.arm.places[usize::from(a)], self.arm.places[usize::from(b)]);
+        let (first, second): (&Part, &Part) = (&self.arm.bodies[body_a][part_a], &self.arm.bodies[body_b][part_b]);
+        let (of_a, of_b) = (Moved::by(&poses[body_a]), Moved::by(&poses[body_b]));
+        let whole = of_b.ball(&second.around);
+        let room = |gap: f64| 0.5 * (gap + OVERSHOOT_M);
+        if room(of_a.ball(&first.around).gap_m(&whole)) >= least {
+            return least;
+        }
+        for ball_a in first.balls.iter().map(|ball| of_a.ball(ball)) {
+            if room(ball_a.gap_m(&whole)) >= least {
+                continue;
+            }
+            for ball_b in second.balls.iter().map(|ball| of_b.ball(ball)) {
+                let value = room(ball_a.gap_m(&ball_b));
+                if value < least {
+                    least = value;
+                    closer();
                 }
             }
         }
-        room
+        least
     }
 
     /// Centre of the occupied voxel that is nearest to a point, or the point itself.
@@ -180,7 +223,7 @@ impl Space<'_> {
 
 /// What a ball met.
 #[derive(Clone, Copy)]
-enum Met {
+pub(super) enum Met {
     Map(Point3<f64>),
     Panel(usize),
     Table,

@@ -4,8 +4,9 @@
 //! clear of table, shelf and the arm itself (upright, or upside down), and there is a way to it from where the arm waits. While it looks the arm
 //! stays out of the shelf altogether, whatever may stand in it.
 
-use super::plan::{PlanSettings, is_segment_free, plan};
+use super::plan::{PlanSettings, plan};
 use super::pusher::ArmTool;
+use super::segment::is_segment_free;
 use super::shortcut::shortcut;
 use super::{Hit, Joints, Motion, Space, frame_of};
 use crate::Pose;

@@ -1,14 +1,14 @@
 //! Ways through a space: straight if that is free, else by two trees that grow towards each other, then shortened.
 
 use super::Joints;
+use super::line::follow_line;
+use super::model::{Arm, JointKind};
 use super::rrt::Trees;
+use super::segment::{Probe, is_span_free};
 use super::shortcut::shortcut;
 use super::space::Space;
 use crate::rng::ChaCha8Rng;
-
-/// Gaps smaller than this between what two configurations are known to have free are taken for free, metres: half of
-/// it may be lost of a margin of 5 mm or more.
-const GAP_M: f64 = 0.004;
+use std::f64::consts::TAU;
 
 /// How much work a query may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,18 +45,15 @@ pub fn plan(
     settings: PlanSettings,
     rng: &mut ChaCha8Rng,
 ) -> Option<Planned> {
-    let start_room = space.room_m(start);
-    if start_room < 0.0 || !space.arm.within_limits(start) {
-        return None;
-    }
+    let from = Probe::free(space, start).filter(|_| space.arm.within_limits(start))?;
     // Straight to a goal, or to where its chain ends.
     for chain in goals {
         let (Some(goal), Some(last)) = (chain.first(), chain.last()) else { continue };
-        if is_segment_free(space, start, last) {
+        if Probe::free(space, last).is_some_and(|last| is_span_free(space, &from, &last)) {
             let path: Vec<Joints> = std::iter::once(*start).chain(chain.iter().rev().copied()).collect();
             return Some(Planned { path: shortcut(space, path, settings.shortcuts, rng), rounds: 0 });
         }
-        if chain.len() > 1 && is_segment_free(space, start, goal) {
+        if chain.len() > 1 && Probe::free(space, goal).is_some_and(|goal| is_span_free(space, &from, &goal)) {
             return Some(Planned { path: vec![*start, *goal], rounds: 0 });
         }
     }
@@ -65,29 +62,31 @@ pub fn plan(
     Some(Planned { path: shortcut(space, path, settings.shortcuts, rng), rounds: trees.rounds() })
 }
 
-/// Whether the straight way between two configurations is free.
-///
-/// The room at a configuration tells how far around it every configuration is free, so a segment is free once the room
-/// at both ends spans it; if not, it is halved (Schwarzer, Saha and Latombe 2005).
-pub(super) fn is_segment_free(space: &Space<'_>, a: &Joints, b: &Joints) -> bool {
-    let (room_a, room_b) = (space.room_m(a), space.room_m(b));
-    room_a >= 0.0 && room_b >= 0.0 && is_span_free(space, a, b, room_a, room_b)
+/// A goal as a chain for [`plan`]: the configuration, then the tool drawn straight back as far as that is free, at most
+/// `out_m` metres: out of the shelf or along the tool's own axis, whichever leads farther.
+pub fn retreat(space: &Space<'_>, goal: &Joints, out_m: f64) -> Vec<Joints> {
+    let axis = space.arm.world_from_tool(goal).rotation * nalgebra::Vector3::z();
+    let back = |way: nalgebra::Vector3<f64>| follow_line(space.arm, goal, &(way * out_m), |q| space.is_free(q)).path;
+    let (straight, own) = (back(-nalgebra::Vector3::y()), back(-axis));
+    if own.len() > straight.len() { own } else { straight }
 }
 
-/// The same for ends whose room is known.
-#[allow(clippy::if_same_then_else, reason = "the order in which the halves are asked is the point")]
-pub(super) fn is_span_free(space: &Space<'_>, a: &Joints, b: &Joints, room_a: f64, room_b: f64) -> bool {
-    let travel = space.arm.travel_m(a, b);
-    if travel <= room_a + room_b + GAP_M {
-        return true;
-    }
-    let middle = a.toward(b, 0.5);
-    let room = space.room_m(&middle);
-    // The half with less room is the likelier to fail, so it goes first.
-    room >= 0.0
-        && if room_a < room_b {
-            is_span_free(space, a, &middle, room_a, room) && is_span_free(space, &middle, b, room, room_b)
-        } else {
-            is_span_free(space, &middle, b, room, room_b) && is_span_free(space, a, &middle, room_a, room)
+/// The same chain and what is the same to the eye: one turning joint turned by a whole turn, where its limits allow that.
+/// Some places are reached one way round only, because the arm would meet itself on the other.
+pub fn turned(arm: &Arm, chain: &[Joints]) -> Vec<Vec<Joints>> {
+    let mut chains = vec![chain.to_vec()];
+    for at in (0..arm.joints.len()).filter(|at| arm.joints[*at].kind == JointKind::Turning) {
+        for turn in [-TAU, TAU] {
+            let whole = |joints: &Joints| {
+                let mut joints = *joints;
+                joints[at] += turn;
+                joints
+            };
+            let turned: Vec<Joints> = chain.iter().map(whole).collect();
+            if turned.iter().all(|joints| arm.within_limits(joints)) {
+                chains.push(turned);
+            }
         }
+    }
+    chains
 }

@@ -5,7 +5,7 @@
 //! already failed to grow, where the passages are narrow.
 
 use super::Joints;
-use super::plan::{is_segment_free, is_span_free};
+use super::segment::{Probe, is_span_free};
 use super::space::Space;
 use crate::rng::ChaCha8Rng;
 use rand::Rng;
@@ -16,11 +16,9 @@ const STEP_M: f64 = 0.35;
 /// A growth shorter than this is none.
 const SHORTEST_M: f64 = 0.02;
 
-#[derive(Clone, Copy)]
 struct Node {
-    at: Joints,
+    probe: Probe,
     parent: usize,
-    room_m: f64,
 }
 
 /// A tree whose roots are their own parents.
@@ -30,16 +28,16 @@ struct Tree {
 }
 
 impl Tree {
-    fn add(&mut self, at: Joints, parent: Option<usize>, room_m: f64) -> usize {
+    fn add(&mut self, probe: Probe, parent: Option<usize>) -> usize {
         let index = self.nodes.len();
-        self.nodes.push(Node { at, parent: parent.unwrap_or(index), room_m });
+        self.nodes.push(Node { probe, parent: parent.unwrap_or(index) });
         index
     }
 
     fn nearest(&self, space: &Space<'_>, to: &Joints) -> usize {
         let mut best = (0, f64::INFINITY);
         for (index, node) in self.nodes.iter().enumerate() {
-            let travel = space.arm.travel_m(&node.at, to);
+            let travel = space.arm.travel_m(&node.probe.at, to);
             if travel < best.1 {
                 best = (index, travel);
             }
@@ -49,10 +47,10 @@ impl Tree {
 
     /// From a node to its root.
     fn branch(&self, mut index: usize) -> Vec<Joints> {
-        let mut branch = vec![self.nodes[index].at];
+        let mut branch = vec![self.nodes[index].probe.at];
         while self.nodes[index].parent != index {
             index = self.nodes[index].parent;
-            branch.push(self.nodes[index].at);
+            branch.push(self.nodes[index].probe.at);
         }
         branch
     }
@@ -76,12 +74,12 @@ pub(super) struct Trees<'s, 'a> {
 impl<'s, 'a> Trees<'s, 'a> {
     pub(super) fn new(space: &'s Space<'a>, start: &Joints, goals: &[Vec<Joints>]) -> Self {
         let mut trees = [Tree::default(), Tree::default()];
-        trees[0].add(*start, None, space.room_m(start));
+        trees[0].add(Probe::trusted(space, start), None);
         let (mut low, mut high) = (*start, *start);
         for chain in goals {
             let mut parent = None;
             for joints in chain {
-                parent = Some(trees[1].add(*joints, parent, space.room_m(joints).max(0.0)));
+                parent = Some(trees[1].add(Probe::trusted(space, joints), parent));
             }
             for joints in chain {
                 for at in 0..joints.len() {
@@ -113,7 +111,7 @@ impl<'s, 'a> Trees<'s, 'a> {
             let target = self.sample(side, rng);
             let from = self.trees[side].nearest(self.space, &target);
             let (Growth::Grown(grown) | Growth::Reached(grown)) = self.grow(side, from, &target) else { continue };
-            let meeting = self.trees[side].nodes[grown].at;
+            let meeting = self.trees[side].nodes[grown].probe.at;
             let mut other = self.trees[1 - side].nearest(self.space, &meeting);
             loop {
                 match self.grow(1 - side, other, &meeting) {
@@ -131,7 +129,7 @@ impl<'s, 'a> Trees<'s, 'a> {
         let mut joints = self.low;
         let local = rng.random_range(0..3) == 0;
         let nodes = &self.trees[side].nodes;
-        let around = nodes[rng.random_range(0..nodes.len())].at;
+        let around = nodes[rng.random_range(0..nodes.len())].probe.at;
         for at in 0..joints.len() {
             joints[at] = if local {
                 (around[at] + rng.random_range(-0.4..0.4)).clamp(self.low[at], self.high[at])
@@ -142,33 +140,22 @@ impl<'s, 'a> Trees<'s, 'a> {
         joints
     }
 
-    /// Grows a tree from one of its nodes towards `target` by one step; half a step where a whole one is not free.
+    /// Grows a tree from one of its nodes towards `target` by one step; less than half of one where a whole one is not
+    /// free.
     fn grow(&mut self, side: usize, from: usize, target: &Joints) -> Growth {
-        let node = self.trees[side].nodes[from];
+        let node = &self.trees[side].nodes[from].probe;
         let travel = self.space.arm.travel_m(&node.at, target);
-        if travel <= SHORTEST_M {
-            return if is_segment_free(self.space, &node.at, target) {
-                self.reach(side, from, target)
-            } else {
-                Growth::Blocked
-            };
-        }
-        let mut share = (STEP_M / travel).min(1.0);
-        for _ in 0..2 {
+        let tries = if travel <= SHORTEST_M { 1 } else { 2 };
+        let mut share = (STEP_M / travel.max(SHORTEST_M)).min(1.0);
+        for _ in 0..tries {
             let next = if share >= 1.0 { *target } else { node.at.toward(target, share) };
-            let room = self.space.room_m(&next);
-            if room >= 0.0 && is_span_free(self.space, &node.at, &next, node.room_m, room) {
-                let added = self.trees[side].add(next, Some(from), room);
+            if let Some(probe) = Probe::free(self.space, &next).filter(|probe| is_span_free(self.space, node, probe)) {
+                let added = self.trees[side].add(probe, Some(from));
                 return if share >= 1.0 { Growth::Reached(added) } else { Growth::Grown(added) };
             }
             share *= 0.4;
         }
         Growth::Blocked
-    }
-
-    fn reach(&mut self, side: usize, from: usize, target: &Joints) -> Growth {
-        let room = self.space.room_m(target);
-        Growth::Reached(self.trees[side].add(*target, Some(from), room))
     }
 
     fn way(&self, side: usize, here: usize, there: usize) -> Vec<Joints> {

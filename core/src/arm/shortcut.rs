@@ -1,7 +1,7 @@
 //! Shortening a way: two random points on it are joined straight wherever that is free.
 
 use super::Joints;
-use super::plan::is_segment_free;
+use super::segment::is_segment_free;
 use super::space::Space;
 use crate::rng::ChaCha8Rng;
 use rand::Rng;

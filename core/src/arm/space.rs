@@ -109,6 +109,19 @@ impl<'a> Space<'a> {
         space
     }
 
+    /// A lower bound on the distance from a point to the panels, metres, that costs less than asking each.
+    pub(super) fn to_panels_m(&self, point: &nalgebra::Point3<f64>) -> f64 {
+        // Between the walls the nearest panel is the nearest of their planes; before the front edge all are behind it.
+        let [low, high] = [self.outer.min, self.outer.max];
+        let beside = (point.x - low[0]).min(high[0] - point.x).min(point.z - low[2]).min(high[2] - point.z) - PANEL_M;
+        let front = low[1] - point.y;
+        match self.panels.len() {
+            5 if front > 0.0 => front,
+            5 => beside.min(high[1] - PANEL_M - point.y).max(0.0),
+            _ => 0.0,
+        }
+    }
+
     /// The panels as boxes.
     pub fn panels(&self) -> Vec<Bounds> {
         let bounds =

@@ -6,7 +6,7 @@ use super::record::{
 use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion, Pusher};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
-use crate::grid::Grid;
+use crate::grid::{Grid, VoxelSet};
 use crate::plan::{self, Action, Decision, History, PushedBy, Reason, Situation};
 use crate::push::ArmClearance;
 use crate::rng::stream;
@@ -107,10 +107,7 @@ impl Episode {
             Some(view) => self.update.observe(&self.belief, &self.observe(view).1),
             None => (*self.belief).clone(),
         };
-        let pusher = match self.record.config.planner.pushed_by {
-            PushedBy::Tool => Pusher::Free((*self.tool).clone()),
-            PushedBy::Arm => Pusher::Arm(self.arm.clone()),
-        };
+        let pusher = self.pusher();
         let situation = Situation {
             belief: &self.belief,
             update: &*self.update,
@@ -191,14 +188,17 @@ impl Episode {
                 let motion = self.motion_for(&arm, &mut decision, &push)?;
                 let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
                 let outcome = self.world.execute_motion(&arm.arm, &motion);
-                let swept = motion.swept_volume(&arm.arm, &self.grid());
+                // The arm knows how far it came: what it did not sweep is not believed to be free.
+                let mut swept = VoxelSet::empty(&self.grid());
+                arm.arm.sweep(&outcome.passed, &self.grid(), &mut swept);
                 (outcome, swept, Some((to_wait.duration_s(), to_wait.then(&motion.whole(&arm.arm)))))
             }
         };
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        let swept = SweptPush { push, swept };
+        let done = if outcome.stalled { Push { length_m: outcome.pushed_m.min(push.length_m), ..push } } else { push };
+        let swept = SweptPush { push: done, swept };
         let prediction = self.predict(&swept, decision.reason);
         if let Some(prediction) = &prediction {
             Arc::make_mut(&mut self.belief).apply(prediction);
@@ -372,6 +372,14 @@ impl Episode {
     /// The arm before the shelf.
     pub fn arm(&self) -> &Arc<ArmTool> {
         &self.arm
+    }
+
+    /// What carries pushes out.
+    pub fn pusher(&self) -> Pusher {
+        match self.record.config.planner.pushed_by {
+            PushedBy::Tool => Pusher::Free((*self.tool).clone()),
+            PushedBy::Arm => Pusher::Arm(self.arm.clone()),
+        }
     }
 
     /// Whether the arm pushes and carries the camera.

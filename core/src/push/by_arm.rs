@@ -19,7 +19,7 @@ use nalgebra::{Translation3, Vector3};
 /// Occupancy probability above which the arm keeps away from a voxel.
 pub const AVOIDED: f32 = 0.7;
 /// Ways from the waiting place that the planner searches for, per push, where none is straight.
-const QUERIES: usize = 0;
+const QUERIES: usize = 1;
 /// Distance of the gripper's poses that are checked along a line, metres: two voxels of the standard grid.
 const GRIPPER_STEP_M: f64 = 0.01;
 /// Branches of the inverse that are tried per turn, those nearest to where the arm waits first.

@@ -51,6 +51,7 @@ impl World {
             back.extend(before_time(&motion.push, along.blocked_s));
         }
         back.push(last);
+        let passed = back.clone();
         back.reverse();
         let way_back = Motion::along(arm, &back, crate::arm::WAY_BACK_M_S);
         // An arm that cannot even go back is taken away where it is: a real one would give way.
@@ -65,6 +66,7 @@ impl World {
         outcome.link_contacts = notes.contacts;
         outcome.against_wall = notes.against_wall;
         outcome.arm_in_shelf_m = notes.arm_in_shelf_m;
+        outcome.passed = passed;
         outcome.arm_s = notes.steps as f32 * TIME_STEP_S;
         outcome
     }

@@ -82,11 +82,7 @@ fn a_push_is_previewed_done_and_reviewed() {
     for map in ["Map of the push: now", "Map of the push: predicted", "Map of the push: change"] {
         assert!(window.sees(map), "{map}");
     }
-    let button = window.harness.get_by_label("Push this");
-    assert!(!button.accesskit_node().is_disabled(), "the chosen push can be done");
-    button.click_accesskit();
-    window.harness.run_steps(2);
-    window.wait();
+    window.click("Push this");
     assert_eq!(window.steps(), 5, "{:?}", window.toasts());
     assert_eq!(window.session().record.steps[4].action, Action::Push(decision.candidates[feasible].push));
     // One step back, the same push shows what happened beside what was predicted.

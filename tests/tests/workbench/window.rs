@@ -139,9 +139,22 @@ impl Window {
     /// Clicks on what has exactly this label, and waits for nothing.
     pub fn press(&mut self, label: &str) {
         self.control(label).scroll_to_me();
-        self.harness.run_steps(2);
+        self.settle(|window| window.control(label).rect());
         click_on(&self.control(label));
         self.harness.run_steps(2);
+    }
+
+    /// Draws frames until something has come to rest where it was scrolled to: scrolling takes a few of them.
+    fn settle(&mut self, place: impl Fn(&Self) -> egui::Rect) {
+        let mut before = egui::Rect::NOTHING;
+        for _ in 0..120 {
+            self.harness.run_steps(2);
+            let now = place(self);
+            if now == before {
+                return;
+            }
+            before = now;
+        }
     }
 
     /// The one control of this name; text that says the same does not count.
@@ -160,7 +173,9 @@ impl Window {
             then(&node.unwrap_or_else(|| panic!("nothing on the window has {label} in its label")));
         };
         first(self, &|node| node.scroll_to_me());
-        self.harness.run_steps(2);
+        self.settle(|window| {
+            window.harness.query_all_by_label_contains(label).next().map_or(egui::Rect::NOTHING, |node| node.rect())
+        });
         first(self, &click_on);
         self.harness.run_steps(2);
         self.wait();

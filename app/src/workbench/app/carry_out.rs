@@ -11,6 +11,7 @@ use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
 use nudge_core::plan::{Action, Decision, PolicyKind, Reason};
+use nudge_core::push::swept_by;
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
 use nudge_core::tool::Push;
@@ -365,7 +366,7 @@ impl App {
         let (of, setup) = ((session.id, moment.step), session.setup.clone());
         self.background.preview.ask(move |_| {
             let belief = moment.belief.belief();
-            let swept = setup.tool.swept_volume(&push, &belief.grid);
+            let swept = swept_by(&setup.pusher, &belief, &push);
             let swept = SweptPush { push, swept };
             let prediction = setup.update.predict_pushes(&belief, std::slice::from_ref(&swept)).pop()?;
             Some(Preview { of, push, prediction: Arc::new(prediction), swept: Arc::new(swept.swept) })

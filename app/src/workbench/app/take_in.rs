@@ -277,8 +277,10 @@ impl App {
             }
         };
         let kept = &model.kept;
+        let motion_s =
+            model.session().and_then(|session| model.panels.motion_s((session.id, model.cursor.min(session.steps()))));
         let key = format!(
-            "{:?} {aspect:.2} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            "{motion_s:?} {:?} {aspect:.2} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             kept.layout,
             kept.light,
             model.session().map(|session| (session.id, session.steps(), session.pending.is_some())),
@@ -309,6 +311,7 @@ impl App {
             candidate: model.candidate,
             preview: model.preview.clone(),
             gain: model.gain_source.clone(),
+            motion_s,
         };
         let painter = painter.clone();
         self.background.space.ask(move |_| {

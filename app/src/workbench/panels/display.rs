@@ -46,6 +46,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         ui.checkbox(&mut display.truth, "truth").on_hover_text("The true objects as glass");
         ui.checkbox(&mut display.views, "views").on_hover_text("The candidate views as frusta, coloured by gain");
         ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
+        ui.checkbox(&mut display.robot, "arm").on_hover_text("The arm where the step had it, and the way of its tip");
         ui.separator();
         key(ui, display.colour_by);
         // The views beside it that show a difference have a scale of their own.
@@ -57,7 +58,9 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
             };
             scale(ui, Colormap::Diverging, name, ["−1", "+1"], unit);
         }
-        ui.weak(format!("{drawn} voxels")).on_hover_text("Drawn; only the surface of what is inside the band shows");
+        let count = egui::RichText::new(format!("{drawn} voxels")).weak();
+        ui.add(egui::Label::new(count).extend())
+            .on_hover_text("Drawn; only the surface of what is inside the band shows");
     });
 }
 

@@ -5,6 +5,7 @@ use super::decision;
 use super::facts::{self, fact};
 use super::floor::{Drawn, FloorMap, Line, Outlines, in_window};
 use super::legend::{self, Bar};
+use super::motion;
 use super::push_review::{self, Review};
 use super::table::Sort;
 use super::textures::{self, Textures};
@@ -44,6 +45,7 @@ pub struct State {
     rejected: bool,
     hovering: bool,
     review: Option<Review>,
+    motion: motion::State,
 }
 
 impl Default for State {
@@ -57,7 +59,18 @@ impl Default for State {
             rejected: false,
             hovering: false,
             review: None,
+            motion: motion::State::default(),
         }
+    }
+}
+
+impl State {
+    pub(super) fn motion_s(&self, step: (SessionId, usize)) -> Option<f64> {
+        self.motion.at_s(step)
+    }
+
+    pub(super) fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
+        self.motion.scrub(step, at_s);
     }
 }
 
@@ -345,6 +358,7 @@ impl Here<'_> {
         state.review = Some(review);
         ui.add_space(8.0);
         push_review::show(ui, &review, &self.session.record, moment);
+        motion::show(ui, &mut state.motion, self.session.id, moment);
     }
 }
 

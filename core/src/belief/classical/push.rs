@@ -2,10 +2,11 @@
 //!
 //! Nothing is simulated. Four things are said, all of them inside a window around the swept volume:
 //!
-//! * **Swept columns are free.** Where the tool has been nothing stands any more: objects stand on the board, do not
-//!   overhang and are taller than the tool's path, so the whole column over a swept floor cell is free, as surely as
-//!   the log-odds limit allows. This holds whether or not something stood there; the reported change of such a cell is
-//!   the largest occupancy probability that the tool met in it.
+//! * **Swept columns are free.** Where arm and tool have been nothing stands any more, and since objects stand on the
+//!   board and do not overhang nothing is above either, as surely as the log-odds limit allows. Below, the column is free
+//!   too where the tool passed lower than any object is high ([`SHORTEST_M`]), or where it met something, which then has
+//!   left; what is lower than a link that passed above it stays. The reported change of a swept cell is the largest
+//!   occupancy probability that was met in it.
 //! * **What the tool meets first moves with it.** The object's patch of the floor plan ([`FloorPlan::patch`]) is shifted
 //!   along the push by what is left of it after the contact, up to the walls. Where it stood is free, where it goes its
 //!   evidence goes with it, halved in log-odds (it may turn or slip off), and so do its labels.
@@ -34,6 +35,8 @@ pub const FAR_M: f32 = 0.09;
 pub const AHEAD_M: f32 = 0.06;
 /// Occupancy probability from which a voxel counts as part of a thing.
 pub(super) const SOLID: f32 = 0.6;
+/// Lower than any object is high, metres: what passes here passes through the whole column.
+pub const SHORTEST_M: f32 = 0.06;
 /// Evidence for free space where an object has left, strong enough to outweigh in the gate what was known of it.
 const GONE: f32 = 100.0;
 
@@ -41,11 +44,13 @@ const GONE: f32 = 100.0;
 pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> PushPrediction {
     let grid = &belief.grid;
     let height = grid.dims[2];
-    // Largest probability that the tool met something, per swept cell; negative where it did not pass.
+    // Largest probability that the tool met something, per swept cell; negative where it did not pass. And how low it was.
     let mut met = vec![-1.0_f32; grid.cell_count()];
+    let mut lowest = vec![height; grid.cell_count()];
     for index in push.swept.iter() {
-        let cell = &mut met[index / height];
-        *cell = cell.max(beta_mean(belief.occupancy[index]));
+        let (cell, level) = (index / height, index % height);
+        met[cell] = met[cell].max(beta_mean(belief.occupancy[index]));
+        lowest[cell] = lowest[cell].min(level);
     }
     let contact = met.iter().copied().fold(0.0, f32::max);
     let track = Track::of(push);
@@ -70,9 +75,17 @@ pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> Pu
         let change;
         let labels: [f32; CLASS_COUNT];
         if met[cell] >= 0.0 {
+            let passed_low = lowest[cell] as f32 * grid.voxel_m <= SHORTEST_M;
+            let gone = passed_low || column[lowest[cell]..].iter().any(|a| beta_mean(*a) > 0.5);
+            let free_from = if gone { 0 } else { lowest[cell] };
             change = met[cell];
-            labels = background;
-            prediction.occupancy.extend(column.iter().map(|a| if beta_mean(*a) > beta_mean(free) { free } else { *a }));
+            labels = if gone { background } else { *before };
+            prediction.occupancy.extend(
+                column
+                    .iter()
+                    .enumerate()
+                    .map(|(level, a)| if level >= free_from && beta_mean(*a) > beta_mean(free) { free } else { *a }),
+            );
         } else if left || source.is_some() {
             change = contact;
             labels = source.map_or(background, |source| belief.semantics[source].map(|a| 0.5 * (1.0 + a)));
@@ -260,6 +273,29 @@ mod tests {
         let in_box = grid.cell_index(grid.cell_at(Point::new(0.0, 0.22, 0.0)).expect("inside"));
         assert_eq!(belief.likeliest(in_box).0.0, 5);
         assert_eq!(after.likeliest(in_box).0, BACKGROUND);
+    }
+
+    #[test]
+    fn what_is_lower_than_a_link_that_passes_above_it_stays() {
+        let (belief, mut push) = push_into_a_box();
+        let grid = &belief.grid;
+        let voxel = |x: f32, y: f32, z: f32| grid.index(grid.voxel_at(Point::new(x, y, z)).expect("inside"));
+        // A link passes over the box, which is 10 cm high, and another over the second box's upper half.
+        push.swept = VoxelSet::empty(grid);
+        push.swept.insert(voxel(0.0, 0.22, 0.15));
+        push.swept.insert(voxel(0.10, 0.24, 0.08));
+        let mut after = belief.clone();
+        after.apply(&Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0]);
+        assert_eq!(after.occupancy[voxel(0.0, 0.22, 0.05)], belief.occupancy[voxel(0.0, 0.22, 0.05)]);
+        assert_eq!(after.likeliest(voxel(0.0, 0.22, 0.0) / grid.dims[2]).0, ClassId(5));
+        assert!(after.probability(voxel(0.10, 0.24, 0.02)) < 0.05, "what was met has left, down to the board");
+        // Nothing was known of this column: it is free from where the link passed, and as unknown as before below.
+        let mut unknown = belief.clone();
+        unknown.occupancy[grid.column(voxel(0.0, 0.22, 0.0) / grid.dims[2])].fill([1.0; 2]);
+        let mut after = unknown.clone();
+        after.apply(&Classical.predict_pushes(&unknown, std::slice::from_ref(&push))[0]);
+        assert!(after.probability(voxel(0.0, 0.22, 0.30)) < 0.05);
+        assert_eq!(after.occupancy[voxel(0.0, 0.22, 0.10)], [1.0; 2]);
     }
 
     #[test]

@@ -1,0 +1,67 @@
+//! The arm's motion of the step at the cursor: its times, what it met, and a slider along it.
+
+use super::facts::{self, fact};
+use super::{heading, words};
+use crate::record::mishaps;
+use crate::workbench::session::{Moment, SessionId};
+use nudge_core::episode::StepOutcome;
+use rerun::external::egui::{self, Ui};
+
+/// What the panel remembers: which step is scrubbed, and how far, seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct State {
+    scrubbed: Option<((SessionId, usize), f64)>,
+}
+
+impl State {
+    /// How far the motion of a step is scrubbed, seconds; `None` where nobody scrubs it.
+    pub fn at_s(&self, step: (SessionId, usize)) -> Option<f64> {
+        self.scrubbed.filter(|(of, _)| *of == step).map(|(_, at_s)| at_s)
+    }
+
+    /// Moves the arm to a time in the motion of a step, seconds.
+    pub fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
+        self.scrubbed = Some((step, at_s));
+    }
+}
+
+/// Draws times, mishaps and slider of the motion that led to `moment`, if there was one.
+pub fn show(ui: &mut Ui, state: &mut State, id: SessionId, moment: &Moment) {
+    let Some(outcome) = moment.outcome.as_deref() else { return };
+    let Some(motion) = outcome.motion.as_ref() else { return };
+    let end = motion.duration_s();
+    heading(
+        ui,
+        format!("The arm in step {}", moment.step),
+        "How the arm moved: to the view, or in, along the push and back",
+    );
+    facts::show(ui, "arm motion", 2, &times(outcome, end));
+    for mishap in mishaps(&outcome.record) {
+        ui.label(mishap.replace('_', " "));
+    }
+    let step = (id, moment.step);
+    let mut at_s = state.at_s(step).unwrap_or(0.0);
+    ui.horizontal(|ui| {
+        ui.spacing_mut().slider_width = (ui.available_width() - 150.0).clamp(80.0, 400.0);
+        let slider = egui::Slider::new(&mut at_s, 0.0..=end).fixed_decimals(1).suffix(" s");
+        let response = ui.add(slider).on_hover_text("Drag to move the arm along its motion");
+        response.widget_info(|| egui::WidgetInfo::slider(true, at_s, "Time in the arm's motion"));
+        if response.changed() {
+            state.scrubbed = Some((step, at_s));
+        }
+        let scrubbed = state.at_s(step).is_some();
+        if ui.add_enabled(scrubbed, egui::Button::new("Let go")).on_hover_text("Hide the arm again").clicked() {
+            state.scrubbed = None;
+        }
+    });
+}
+
+fn times(outcome: &StepOutcome, end: f64) -> Vec<facts::Fact> {
+    let seconds = |s: f64| format!("{} s", words::significant(s, 3));
+    let mut facts = vec![fact("moves", seconds(end), "The whole motion of the arm, its own time")];
+    if let (Some(push), true) = (&outcome.record.decision.motion, outcome.push_outcome.is_some()) {
+        facts.push(fact("way in", seconds(push.way_in.duration_s()), "From where the arm waits to the push's start"));
+        facts.push(fact("push", seconds(push.push.duration_s()), "Along the push"));
+    }
+    facts
+}

@@ -7,6 +7,7 @@ use nudge_core::grid::Grid;
 use nudge_core::scene::{BACKGROUND, CLASS_COUNT, Catalog, ClassId};
 use nudge_core::score::SCORED_HEIGHT_M;
 use nudge_core::world::TruthMap;
+use std::sync::LazyLock;
 
 /// A floor cell whose likeliest class is not likelier than this has not been told anything.
 const UNKNOWN_BELOW: f32 = 1.05 / CLASS_COUNT as f32;
@@ -81,10 +82,23 @@ pub fn paint_labels(grid: &Grid, labels: &[u8], catalog: &Catalog) -> RgbImage {
 }
 
 /// Entropy over every floor cell, nats: the column's voxels in the scored volume and the cell's class. Their sum is
-/// the map's entropy.
+/// the map's entropy, to within a thousandth: logarithms come from a table.
 pub fn cell_entropy(belief: &Belief) -> Vec<f32> {
+    const STEPS: usize = 4096;
+    static TABLE: LazyLock<Vec<f32>> = LazyLock::new(|| {
+        (0..=STEPS + 1).map(|i| belief::bernoulli_entropy((i as f32 / STEPS as f32).min(1.0))).collect()
+    });
+    let table = &*TABLE;
     let levels = belief.grid.levels_below(SCORED_HEIGHT_M);
-    let of_cell = |cell| column_entropy(&belief.occupancy[belief.grid.column(cell)][..levels], &belief.semantics[cell]);
+    let of_voxel = |a: &[f32; 2]| {
+        let at = (belief::beta_mean(*a) * STEPS as f32).clamp(0.0, STEPS as f32);
+        let low = at as usize;
+        table[low] + (table[low + 1] - table[low]) * (at - low as f32)
+    };
+    let of_cell = |cell: usize| {
+        let column = &belief.occupancy[belief.grid.column(cell)][..levels];
+        column.iter().map(of_voxel).sum::<f32>() + belief::dirichlet_entropy(&belief.semantics[cell])
+    };
     (0..belief.grid.cell_count()).map(of_cell).collect()
 }
 

@@ -91,8 +91,8 @@ pub struct Display {
     pub colour_by: ColourBy,
     /// Voxels with a probability in this range are drawn.
     pub band: [f32; 2],
-    /// Voxels between these heights above the board are drawn, metres.
-    pub clip_m: [f32; 2],
+    /// Voxels between these places along x, y and z are drawn, metres: a slice when two are close.
+    pub slice_m: [[f32; 2]; 3],
     /// The true objects as glass.
     pub truth: bool,
     /// The candidate views as frusta.
@@ -103,12 +103,15 @@ pub struct Display {
     pub robot: bool,
 }
 
+/// No slice: beyond any shelf, so that a shelf of any size is whole.
+pub const EVERYWHERE_M: [[f32; 2]; 3] = [[-5.0, 5.0]; 3];
+
 impl Default for Display {
     fn default() -> Self {
         Self {
             colour_by: ColourBy::Probability,
             band: [0.5, 1.0],
-            clip_m: [0.0, 0.40],
+            slice_m: EVERYWHERE_M,
             truth: true,
             views: true,
             pushes: false,

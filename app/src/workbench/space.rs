@@ -15,9 +15,9 @@ use crate::picture;
 use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::{colored, surface};
-use nudge_core::belief::{Belief, bernoulli_entropy, beta_mean};
+use nudge_core::belief::{Belief, bernoulli_entropy};
 use nudge_core::camera::ViewId;
-use nudge_core::grid::Grid;
+use nudge_core::grid::{Cell, Grid};
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{BACKGROUND, Body, Catalog, ClassId, Shelf};
 use nudge_core::world::TruthMap;
@@ -472,8 +472,8 @@ impl Painter {
 }
 
 /// What of the display decides about the belief's voxels.
-fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [f32; 2]) {
-    (display.colour_by, display.band, display.clip_m)
+fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [[f32; 2]; 3]) {
+    (display.colour_by, display.band, display.slice_m)
 }
 
 /// Every second, third ... voxel, if there are too many.
@@ -495,27 +495,32 @@ impl<'a> Voxels<'a> {
         let (belief, truth, catalog) = (self.belief, self.truth, self.catalog);
         let grid = &belief.grid;
         let height = grid.dims[2];
-        let [low, high] = display.clip_m.map(|m| m / grid.voxel_m);
         let [least, most] = display.band;
-        let inside = |index: usize| {
-            let level = (index % height) as f32 + 0.5;
-            level >= low && level <= high
-        };
+        // Per axis, which numbers of voxels have their centre in the slice; a slice thinner than a voxel has one.
+        let slices: [[usize; 2]; 3] = std::array::from_fn(|axis| {
+            let at = |m: f32| ((m - grid.origin[axis]) / grid.voxel_m).clamp(0.0, grid.dims[axis] as f32);
+            let [low, high] = display.slice_m[axis].map(at);
+            let first = ((low - 0.5).ceil().max(0.0) as usize).min(grid.dims[axis] - 1);
+            [first, ((high - 0.5).floor().max(first as f32) as usize).min(grid.dims[axis] - 1)]
+        });
         let in_band = |p: f32| p >= least && p <= most && (p > 0.5 || least < 0.5);
         let changed = |index: usize| before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
-        let voxels: Vec<bool> = belief
-            .occupancy
-            .iter()
-            .enumerate()
-            .map(|(index, a)| {
-                inside(index)
-                    && match display.colour_by {
-                        ColourBy::Change => changed(index).abs() >= CHANGED,
-                        ColourBy::Error => (beta_mean(*a) > 0.5) || truth.occupancy[index] == 1,
-                        _ => in_band(beta_mean(*a)),
-                    }
-            })
-            .collect();
+        let shows = |index: usize| match display.colour_by {
+            ColourBy::Change => changed(index).abs() >= CHANGED,
+            ColourBy::Error => belief.probability(index) > 0.5 || truth.occupancy[index] == 1,
+            _ => in_band(belief.probability(index)),
+        };
+        let mut voxels = vec![false; grid.voxel_count()];
+        let [along_x, along_y, along_z] = slices.map(|[first, last]| first..=last);
+        for x in along_x {
+            for y in along_y.clone() {
+                let column = grid.column(grid.cell_index(Cell { x: x as u16, y: y as u16 })).start;
+                let levels = column + along_z.start()..column + along_z.end() + 1;
+                for (voxel, index) in voxels[levels.clone()].iter_mut().zip(levels) {
+                    *voxel = shows(index);
+                }
+            }
+        }
         let shown = surface(grid, &voxels);
         let rgb: Box<dyn Fn(usize) -> Rgb + 'a> = match display.colour_by {
             ColourBy::Probability => Box::new(move |index| Colormap::Viridis.rgb(belief.probability(index))),

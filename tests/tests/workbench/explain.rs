@@ -1,11 +1,12 @@
 //! Asking why, gains of views, what a push would do and did.
 
 use super::window::Window;
-use egui_kittest::kittest::{NodeT as _, Queryable};
+use egui_kittest::kittest::{Queryable, by};
 use nudge::workbench::command::Command;
 use nudge::workbench::model::{Hovered, LayoutKind, Picked};
 use nudge_core::camera::ViewId;
 use nudge_core::plan::Action;
+use rerun::external::egui::accesskit::Role;
 use rerun::external::egui::{Key, Modifiers};
 
 #[test]
@@ -26,6 +27,12 @@ fn a_cell_and_a_voxel_are_asked_about_by_pointer_and_by_key() {
     for words in ["Beta", "variance", "entropy", "truth", "Over the steps", "Class of the floor cell"] {
         assert!(window.sees(words), "{words}");
     }
+    // The arrow keys walk up and down the column.
+    let Some(Picked::Voxel(voxel)) = window.model().picked else { panic!("{:?}", window.model().picked) };
+    window.harness.get_by_label("Probability of occupancy up the column").focus();
+    window.harness.run_steps(2);
+    window.key(Modifiers::NONE, Key::ArrowDown);
+    assert_eq!(window.model().picked, Some(Picked::Voxel(voxel - 1)));
     window.click("Its floor cell");
     assert_eq!(window.model().picked, Some(Picked::Cell(cell + 1)));
     // History and causes lead to their steps.
@@ -85,6 +92,17 @@ fn a_push_is_previewed_done_and_reviewed() {
     window.click("Push this");
     assert_eq!(window.steps(), 5, "{:?}", window.toasts());
     assert_eq!(window.session().record.steps[4].action, Action::Push(decision.candidates[feasible].push));
+    // The arm can be moved along what it did.
+    assert!(window.sees("The arm in step 5") && window.sees("way in"));
+    let scrubbed = |window: &Window| window.model().panels.motion_s((window.session().id, 5));
+    assert_eq!(scrubbed(&window), None);
+    let slider = "Time in the arm's motion";
+    window.harness.get(by().role(Role::Slider).label(slider)).focus();
+    window.harness.run_steps(2);
+    window.key(Modifiers::NONE, Key::ArrowRight);
+    assert!(scrubbed(&window).is_some_and(|at_s| at_s > 0.0), "{:?}", scrubbed(&window));
+    window.click("Let go");
+    assert_eq!(scrubbed(&window), None);
     // One step back, the same push shows what happened beside what was predicted.
     window.click("Step 4");
     window.click_first(&format!("Push {feasible}, value"));

@@ -3,12 +3,12 @@
 use super::{legend, words};
 use crate::colors::{self, Colormap, Rgb};
 use crate::workbench::command::Command;
-use crate::workbench::model::{ColourBy, LayoutKind, Model};
+use crate::workbench::model::{ColourBy, EVERYWHERE_M, LayoutKind, Model};
 use rerun::external::egui;
 
 /// Draws the choices below the three-dimensional views. `drawn` is the number of voxels that are shown.
 pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<Command>) {
-    let ceiling = model.session().map_or(0.40, |session| session.record.scene.shelf.size[2]);
+    let size = model.session().map_or([0.80, 0.40, 0.40], |session| session.record.scene.shelf.size);
     let layout = model.kept.layout;
     let most = model
         .gain_source
@@ -39,14 +39,42 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
             ui.label("band");
             range(ui, &mut display.band, 0.0..=1.0, 0.01, "", "probability");
         }
-        ui.label("height");
-        range(ui, &mut display.clip_m, 0.0..=ceiling, 0.005, " m", "height above the board");
+        let count = egui::RichText::new(format!("{drawn} voxels")).weak();
+        ui.add(egui::Label::new(count).extend())
+            .on_hover_text("Drawn; only the surface of what is inside the band shows");
+    });
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        ui.spacing_mut().interact_size.x = 30.0;
+        let [width, depth, height] = size;
+        let axes = [
+            ("x", [-0.5 * width, 0.5 * width], "x, from left to right"),
+            ("y", [0.0, depth], "y, into the shelf"),
+            ("z", [0.0, height], "z, height above the board"),
+        ];
+        for ((name, [low, high], what), slice) in axes.into_iter().zip(&mut display.slice_m) {
+            let mut shown = slice.map(|m| m.clamp(low, high));
+            ui.label(name).on_hover_text(what);
+            range(ui, &mut shown, low..=high, 0.005, "", what);
+            if shown != slice.map(|m| m.clamp(low, high)) {
+                *slice = shown;
+            }
+        }
+        ui.weak("m");
+        let whole = display.slice_m == EVERYWHERE_M;
+        let button = egui::Button::new("Whole").small();
+        if ui.add_enabled(!whole, button).on_hover_text("Show the whole belief again, no slice of it").clicked() {
+            display.slice_m = EVERYWHERE_M;
+        }
     });
     ui.horizontal_wrapped(|ui| {
         ui.checkbox(&mut display.truth, "truth").on_hover_text("The true objects as glass");
         ui.checkbox(&mut display.views, "views").on_hover_text("The candidate views as frusta, coloured by gain");
         ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
-        ui.checkbox(&mut display.robot, "arm").on_hover_text("The arm where the step had it, and the way of its tip");
+        if layout != LayoutKind::Compare {
+            let hint = "The arm where the step had it, and the way of its tip";
+            ui.checkbox(&mut display.robot, "arm").on_hover_text(hint);
+        }
         ui.separator();
         key(ui, display.colour_by);
         // The views beside it that show a difference have a scale of their own.
@@ -58,9 +86,6 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
             };
             scale(ui, Colormap::Diverging, name, ["−1", "+1"], unit);
         }
-        let count = egui::RichText::new(format!("{drawn} voxels")).weak();
-        ui.add(egui::Label::new(count).extend())
-            .on_hover_text("Drawn; only the surface of what is inside the band shows");
     });
 }
 

@@ -15,11 +15,13 @@ use crate::picture;
 use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::{colored, surface};
+use nudge_core::Pose;
 use nudge_core::belief::{Belief, bernoulli_entropy};
 use nudge_core::camera::ViewId;
 use nudge_core::grid::{Cell, Grid};
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{BACKGROUND, Body, Catalog, ClassId, Shelf};
+use nudge_core::solid::ConvexPart;
 use nudge_core::world::TruthMap;
 use rerun::{AsComponents, RecordingStream};
 use std::collections::BTreeMap;
@@ -548,27 +550,44 @@ impl<'a> Voxels<'a> {
 }
 
 fn glass(bodies: &[Body], catalog: &Catalog) -> rerun::Mesh3D {
-    let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut facets = Facets::default();
     for body in bodies {
         let [r, g, b] = colors::of_class(catalog, body.class);
         let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, shapes::GLASS_ALPHA);
-        for (position, normal) in shapes::facets(&body.solid.parts) {
-            let position = body.world_from_body * position;
-            let normal = body.world_from_body * normal;
-            positions.push(<[f32; 3]>::from(position.coords));
-            normals.push(<[f32; 3]>::from(normal));
-            colors.push(color);
+        facets.add(&body.solid.parts, &body.world_from_body, color);
+    }
+    facets.mesh(shapes::GLASS_ALPHA)
+}
+
+/// Coloured triangles of solids, on their way to one mesh.
+#[derive(Default)]
+struct Facets {
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    colors: Vec<rerun::Rgba32>,
+}
+
+impl Facets {
+    fn add(&mut self, parts: &[ConvexPart], world_from_parts: &Pose, color: rerun::Rgba32) {
+        for (position, normal) in shapes::facets(parts) {
+            self.positions.push((world_from_parts * position).coords.into());
+            self.normals.push((world_from_parts * normal).into());
+            self.colors.push(color);
         }
     }
-    if positions.is_empty() {
-        return nothing();
+
+    /// `alpha` is that of the whole: 255 for what covers what was drawn see-through before.
+    fn mesh(self, alpha: u8) -> rerun::Mesh3D {
+        if self.positions.is_empty() {
+            return nothing();
+        }
+        let triangles = (0..self.positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
+        rerun::Mesh3D::new(self.positions)
+            .with_vertex_normals(self.normals)
+            .with_vertex_colors(self.colors)
+            .with_triangle_indices(triangles)
+            .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, alpha))
     }
-    let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
-    rerun::Mesh3D::new(positions)
-        .with_vertex_normals(normals)
-        .with_vertex_colors(colors)
-        .with_triangle_indices(triangles)
-        .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, shapes::GLASS_ALPHA))
 }
 
 /// A mesh that cannot be seen.

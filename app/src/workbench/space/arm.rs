@@ -1,7 +1,7 @@
 //! The arm before the shelf: where it is in a step's motion, and the way of its tip.
 
-use super::{Painter, Side, Space, at, nothing};
-use crate::record::{robot, shapes};
+use super::{Facets, Painter, Side, Space, at, nothing};
+use crate::record::robot;
 use nudge_core::arm::{ArmTool, Joints, Motion, Role, pose_of};
 use nudge_core::plan::Action;
 
@@ -37,24 +37,11 @@ impl Painter {
 /// All links of the arm as one mesh in the shelf's frame.
 fn links(arm: &ArmTool, joints: &Joints) -> rerun::Mesh3D {
     let poses = arm.arm.body_poses(joints);
-    let (mut positions, mut normals, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut facets = Facets::default();
     for (body, part) in arm.arm.parts() {
-        let pose = pose_of(&poses[body]);
         let [r, g, b] = if part.role == Role::Tool { robot::TOOL_RGB } else { robot::LINK_RGB };
-        for (position, normal) in shapes::facets(std::slice::from_ref(&part.shape)) {
-            positions.push(<[f32; 3]>::from((pose * position).coords));
-            normals.push(<[f32; 3]>::from(pose * normal));
-            colors.push(rerun::Rgba32::from_unmultiplied_rgba(r, g, b, 255));
-        }
+        let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, 255);
+        facets.add(std::slice::from_ref(&part.shape), &pose_of(&poses[body]), color);
     }
-    if positions.is_empty() {
-        return nothing();
-    }
-    let triangles = (0..positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
-    rerun::Mesh3D::new(positions)
-        .with_vertex_normals(normals)
-        .with_vertex_colors(colors)
-        .with_triangle_indices(triangles)
-        // What is drawn see-through before must be covered again.
-        .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, 255))
+    facets.mesh(255)
 }

@@ -1,5 +1,6 @@
 //! A scripted episode for tests: real images, real pushes and the classical belief, with made-up gains.
 
+use nudge_core::arm::ArmTool;
 use nudge_core::belief::{Belief, BeliefUpdate, Classical, SweptPush};
 use nudge_core::camera::{self, ViewArray, ViewId};
 use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
@@ -7,7 +8,6 @@ use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, Polic
 use nudge_core::rng;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::score::{Scores, object_verdicts};
-use nudge_core::tool::Tool;
 use nudge_core::world::{TruthMap, World};
 
 /// An episode with everything that it went through.
@@ -29,7 +29,7 @@ pub fn play(steps: usize) -> Played {
     let mut scene = generate(&catalog, &GenerateConfig::default(), 5).expect("scene");
     scene.name = "demo shelf".into();
     let views = ViewArray::named("standard300").expect("views");
-    let (shelf, grid, tool) = (scene.shelf, scene.grid(), Tool::standard());
+    let (shelf, grid, arm) = (scene.shelf, scene.grid(), ArmTool::standard(scene.shelf));
     let mut world = World::new(shelf, scene.bodies(&catalog).expect("bodies"));
     world.settle();
     let mut belief = Belief::uniform(grid);
@@ -48,7 +48,7 @@ pub fn play(steps: usize) -> Played {
         let mut outcome = None;
         if index % 5 == 4 {
             let mut stream = rng::stream(7, "fixture-pushes", index as u64);
-            let candidates = nudge_core::push::sample(&belief, &tool, 80, &mut stream);
+            let candidates = nudge_core::push::sample(&belief, &arm, 80, &mut stream);
             let mut rank = 0.0;
             decision.candidates = candidates
                 .iter()
@@ -71,7 +71,7 @@ pub fn play(steps: usize) -> Played {
                 let prediction = Classical.predict_pushes(&belief, std::slice::from_ref(&swept)).remove(0);
                 decision.action = Action::Push(swept.push);
                 decision.reason = Reason::PushTellsMore;
-                let pushed = world.execute(&tool, &swept.push);
+                let pushed = world.execute(&arm.arm, candidates[best].motion.as_ref().expect("of a feasible one"));
                 belief.apply(&prediction);
                 truth = TruthMap::of(&grid, &world.bodies());
                 outcome = Some((swept, prediction, pushed));

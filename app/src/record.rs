@@ -56,7 +56,7 @@ pub struct Setting<'a> {
     /// Weight of the disturbance term.
     pub gamma: f32,
     /// The arm before the shelf, where there is one to show.
-    pub arm: Option<&'a ArmTool>,
+    pub arm: &'a ArmTool,
     /// Views that its hand cannot be at.
     pub unreachable: &'a [ViewId],
 }
@@ -197,12 +197,10 @@ impl Recorder {
         self.fix(paths::SHELF, &shapes::shelf_panels(setting.shelf))?;
         self.fix(paths::SHELF_EDGES, &shapes::shelf_edges(setting.shelf))?;
         self.fix(paths::CAMERA_VIEWS, &shapes::view_frusta(setting.views))?;
-        if let Some(arm) = setting.arm {
-            self.fix(paths::CAMERA_REACH, &robot::reachable(setting.views, setting.unreachable))?;
-            for (number, parts) in arm.arm.bodies.iter().enumerate() {
-                if let Some(mesh) = robot::body(parts) {
-                    self.fix(&paths::robot_body(number), &mesh)?;
-                }
+        self.fix(paths::CAMERA_REACH, &robot::reachable(setting.views, setting.unreachable))?;
+        for (number, parts) in setting.arm.arm.bodies.iter().enumerate() {
+            if let Some(mesh) = robot::body(parts) {
+                self.fix(&paths::robot_body(number), &mesh)?;
             }
         }
         let grid = setting.shelf.grid();
@@ -231,7 +229,7 @@ impl Recorder {
     fn robot(&mut self, setting: &Setting<'_>, step: usize, outcome: Option<&StepOutcome>) -> Result<()> {
         self.stream.set_time_sequence(paths::TIMELINE, step as i64);
         self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s);
-        let Some(arm) = setting.arm else { return Ok(()) };
+        let arm = setting.arm;
         let pose = |joints: &Joints| {
             let transforms = robot::transforms(arm, joints);
             transforms
@@ -427,7 +425,7 @@ fn setting(episode: &Episode) -> Setting<'_> {
         views: episode.views(),
         budget: record.config.budget,
         gamma: record.config.planner.gamma,
-        arm: Some(episode.arm().as_ref()).filter(|_| episode.is_by_arm()),
+        arm: episode.arm(),
         unreachable: episode.unreachable_views(),
     }
 }

@@ -2,11 +2,11 @@
 //!
 //! Times of one thread are processor times, so that a busy machine does not count.
 
-use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, Pusher, level_tool, plan, retreat, turned};
+use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, level_tool, plan, retreat, turned};
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, project, render};
 use nudge_core::grid::VoxelSet;
-use nudge_core::push::sample_by;
+use nudge_core::push::sample;
 use nudge_core::rng::stream;
 use nudge_core::scene::{Catalog, RobotPlacement, Scene};
 use nudge_core::world::{TruthMap, World};
@@ -15,7 +15,6 @@ use parry3d::shape::Voxels;
 use rand::Rng;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 /// How far the arm backs out of the shelf at most, metres.
@@ -199,9 +198,9 @@ fn pushes(scenes: &[Crowded]) {
             let image = render(&scene.shelf, &bodies, view, &views.intrinsics);
             belief = Classical.observe(&belief, &project(&image, view, &views.intrinsics, &scene.shelf));
         }
-        let pusher = Pusher::Arm(Arc::new(ArmTool::standard(scene.shelf)));
+        let tool = ArmTool::standard(scene.shelf);
         let (wall, processor) = (Instant::now(), process_s());
-        let candidates = sample_by(&belief, &pusher, 80, &mut stream(1, "pushes", 0));
+        let candidates = sample(&belief, &tool, 80, &mut stream(1, "pushes", 0));
         let (wall, processor) = (wall.elapsed().as_secs_f64(), process_s() - processor);
         let feasible: Vec<_> = candidates.iter().filter_map(|c| c.motion.as_ref()).collect();
         println!(
@@ -224,13 +223,12 @@ fn pushes(scenes: &[Crowded]) {
             processor / 2.0 * 80.0 / feasible.len().max(1) as f64,
             Some(0.6),
         );
-        let Pusher::Arm(tool) = &pusher else { continue };
         let mut world = World::new(scene.shelf, bodies.clone());
         world.settle();
         let mut deepest = 0.0_f32;
         let (mut stalls, mut touched, mut pressed, mut moved) = (0, 0, 0, 0);
         for motion in feasible.iter().take(10) {
-            let outcome = world.clone().execute_motion(&tool.arm, motion);
+            let outcome = world.clone().execute(&tool.arm, motion);
             deepest = deepest.max(outcome.arm_in_shelf_m);
             stalls += usize::from(outcome.stalled);
             touched += usize::from(!outcome.link_contacts.is_empty());

@@ -10,10 +10,11 @@ mod floor;
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
 
+use crate::arm::{Arm, Push};
 use crate::camera::MapObservation;
 use crate::grid::{Grid, VoxelSet, Window};
 use crate::scene::{CLASS_COUNT, ClassId};
-use crate::tool::Push;
+use crate::world::PushOutcome;
 use rayon::prelude::*;
 
 /// A floor cell's certainty (largest class probability) above which it counts as known.
@@ -176,6 +177,16 @@ pub struct SweptPush {
     pub push: Push,
     /// Every voxel that gripper or links touch, approach included.
     pub swept: VoxelSet,
+}
+
+impl SweptPush {
+    /// A push as far as the arm really came, with what it swept until then.
+    pub fn done(push: &Push, outcome: &PushOutcome, arm: &Arm, grid: &Grid) -> Self {
+        let mut swept = VoxelSet::empty(grid);
+        arm.sweep(&outcome.passed, grid, &mut swept);
+        let length_m = if outcome.stalled { outcome.pushed_m.min(push.length_m) } else { push.length_m };
+        Self { push: Push { length_m, ..*push }, swept }
+    }
 }
 
 /// How a belief changes with an observation (sigma_o) and how it is predicted to change with a push (sigma_m).

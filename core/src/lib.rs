@@ -25,7 +25,6 @@ pub mod rng;
 pub mod scene;
 pub mod score;
 pub mod solid;
-pub mod tool;
 pub mod world;
 
 pub use error::{Error, Result};

@@ -13,11 +13,11 @@ pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, QUIET_STEPS, SATURATION, look_or_push, push_guard, saturated};
 pub use weigh::{COARSE_VIEWS, disturbance};
 
-use crate::arm::{PushMotion, Pusher};
+use crate::arm::Push;
+use crate::arm::{ArmTool, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CERTAIN, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::push::Rejection;
-use crate::tool::Push;
 use serde::{Deserialize, Serialize};
 
 /// Weight of the disturbance term.
@@ -173,8 +173,8 @@ pub struct Situation<'a> {
     pub update: &'a dyn BeliefUpdate,
     /// The candidate views.
     pub views: &'a ViewArray,
-    /// What pushes.
-    pub pusher: &'a Pusher,
+    /// The arm that pushes.
+    pub arm: &'a ArmTool,
     /// Views that are not offered: the hand cannot be there.
     pub unreachable: &'a [ViewId],
     /// What happened so far.
@@ -194,45 +194,10 @@ impl Situation<'_> {
     }
 }
 
-/// What carries pushes out, as a user chooses it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PushedBy {
-    /// Gripper and last links that come in straight and need no arm; every view is in reach.
-    Tool,
-    /// The scene's arm: only what it reaches is offered.
-    #[default]
-    Arm,
-}
-
-impl PushedBy {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Tool, Self::Arm];
-}
-
-impl std::fmt::Display for PushedBy {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Tool => "tool",
-            Self::Arm => "arm",
-        })
-    }
-}
-
-impl std::str::FromStr for PushedBy {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|by| by.to_string() == text).ok_or_else(|| "there are tool and arm".to_owned())
-    }
-}
-
 /// Numbers of the planner that a user may change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PlannerSettings {
-    /// What carries pushes out.
-    pub pushed_by: PushedBy,
     /// Push candidates drawn per decision.
     pub candidates: usize,
     /// Weight of the disturbance term.
@@ -250,7 +215,6 @@ pub struct PlannerSettings {
 impl Default for PlannerSettings {
     fn default() -> Self {
         Self {
-            pushed_by: PushedBy::default(),
             candidates: 80,
             gamma: GAMMA,
             certain: CERTAIN,

@@ -3,22 +3,19 @@
 //! The frontier is the first surely occupied voxel ([`CONFIDENT`]) seen from the shelf's entrance in each (x, z) column.
 //! A candidate starts [`STANDOFF_M`] before a random frontier point, at the tool's height [`TOOL_HEIGHT_M`] above the
 //! board, goes towards a random likely occupied voxel within [`REACH_M`] of the point, never back towards the entrance
-//! (that would pull objects over the edge), and is 50 to 150 mm long. It is feasible if the tool touches neither the
-//! shelf nor a confident voxel that is not the target's, all the way in and along the push; see [`Clearance`].
+//! (that would pull objects over the edge), and is 50 to 150 mm long. It is feasible if the arm has a motion for it that
+//! touches neither the shelf nor what is believed to stand there, the target apart; see [`ArmClearance`].
 
-mod by_arm;
 mod clearance;
 mod frontier;
 
-pub use by_arm::{AVOIDED, ArmClearance};
-pub use clearance::Clearance;
+pub use clearance::{AVOIDED, ArmClearance};
 pub use frontier::frontier;
 
-use crate::arm::{Hit, Obstacle, PushMotion, Pusher};
+use crate::arm::{ArmTool, Hit, Obstacle, Push, PushMotion, level_tool};
 use crate::belief::{Belief, SweptPush};
-use crate::grid::{Voxel, VoxelSet};
+use crate::grid::{Grid, Voxel, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
-use crate::tool::{Push, Tool};
 use frontier::likely_targets;
 use rand::Rng;
 use rayon::prelude::*;
@@ -36,10 +33,9 @@ pub const TOOL_HEIGHT_M: f32 = 0.06;
 pub const REACH_M: f32 = 0.06;
 /// Shortest and longest push, metres.
 pub const LENGTH_M: [f32; 2] = [0.05, 0.15];
-/// At most this many frontier points are tried for each feasible candidate asked for.
-pub const DRAWS_PER_CANDIDATE: usize = 10;
-/// The same where an arm pushes: each takes longer to check, and more of them fail.
-pub const ARM_DRAWS_PER_CANDIDATE: usize = 4;
+/// At most this many frontier points are tried for each feasible candidate asked for: each takes the arm a while to
+/// check.
+pub const DRAWS_PER_CANDIDATE: usize = 4;
 
 /// Why a candidate is no candidate.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -47,18 +43,6 @@ pub const ARM_DRAWS_PER_CANDIDATE: usize = 4;
 pub enum Rejection {
     /// No likely occupied voxel within reach of the frontier point.
     NoTarget,
-    /// The tool's start pose touches a high-confidence voxel.
-    StartBlocked {
-        /// Centre of the first such voxel, metres.
-        at: [f32; 3],
-    },
-    /// The way in or the push touches a high-confidence voxel that is not the target's.
-    PathBlocked {
-        /// Centre of the first such voxel, metres.
-        at: [f32; 3],
-    },
-    /// The tool would touch board, walls or ceiling.
-    Shelf,
     /// The arm does not reach, in any of its configurations.
     Unreachable {
         /// Which part of the push.
@@ -80,8 +64,6 @@ impl Rejection {
     /// The reason without the place: for counting what keeps pushes from being candidates.
     pub fn kind_words(&self) -> String {
         match self {
-            Self::StartBlocked { .. } => "the start is blocked by what is believed to stand there".to_owned(),
-            Self::PathBlocked { .. } => "the path is blocked by what is believed to stand there".to_owned(),
             Self::ArmBlocked { stage, hit } => {
                 let met = match &hit.obstacle {
                     Obstacle::Map { .. } => "what is believed to stand there".to_owned(),
@@ -122,13 +104,6 @@ impl std::fmt::Display for Rejection {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::NoTarget => write!(f, "nothing likely to push is near"),
-            Self::StartBlocked { at: [x, y, z] } => {
-                write!(f, "the start is blocked by what is believed to stand at ({x:.3}, {y:.3}, {z:.3})")
-            }
-            Self::PathBlocked { at: [x, y, z] } => {
-                write!(f, "the path is blocked by what is believed to stand at ({x:.3}, {y:.3}, {z:.3})")
-            }
-            Self::Shelf => write!(f, "the tool would touch the shelf"),
             Self::Unreachable { stage } => write!(f, "out of the arm's reach {stage}"),
             Self::ArmBlocked { stage, hit } => write!(f, "{stage}, {hit}"),
             Self::NoWay => write!(f, "no free way to the start was found"),
@@ -141,17 +116,30 @@ impl std::fmt::Display for Rejection {
 pub struct Candidate {
     /// The frontier voxel it starts from.
     pub frontier: Voxel,
-    /// The push and what it sweeps.
+    /// The push and what the arm sweeps on its way there and along it; of a rejected one, what the gripper would along it.
     pub swept: SweptPush,
     /// `None` for a feasible candidate.
     pub rejection: Option<Rejection>,
-    /// The arm's motion for a feasible candidate, when an arm pushes.
+    /// The arm's motion for a feasible candidate.
     pub motion: Option<PushMotion>,
 }
 
-/// Draws candidates for a tool that needs no arm; as [`sample_by`].
-pub fn sample(belief: &Belief, tool: &Tool, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
-    sample_checked(belief, &Check::Free { tool, clearance: Clearance::new(belief) }, count, rng)
+/// What a push that a person thinks of would sweep: by the arm's motion for it, or by the gripper alone along it where the
+/// arm cannot carry it out.
+pub fn swept_by(arm: &ArmTool, belief: &Belief, push: &Push) -> VoxelSet {
+    let clearance = ArmClearance::new(arm, belief);
+    match clearance.motion(push, &clearance.target_of(push), &mut stream(0, "push to look at", 0)) {
+        Ok(motion) => motion.swept_volume(&arm.arm, &belief.grid),
+        Err(_) => gripper_along(arm, push, &belief.grid),
+    }
+}
+
+/// Every voxel that the gripper touches along a push when it points straight into the shelf.
+fn gripper_along(arm: &ArmTool, push: &Push, grid: &Grid) -> VoxelSet {
+    let mut swept = VoxelSet::empty(grid);
+    let travel = push.direction().map(f64::from) * f64::from(push.length_m);
+    arm.arm.sweep_gripper(&level_tool(&push.start_point().map(f64::from), 0.0), &travel, grid, &mut swept);
+    swept
 }
 
 /// Draws candidates until `count` of them are feasible, and returns all of them, rejected ones too, in the order drawn.
@@ -159,65 +147,12 @@ pub fn sample(belief: &Belief, tool: &Tool, count: usize, rng: &mut ChaCha8Rng) 
 /// Frontier points are drawn without replacement. Drawing ends early when there are no more of them or after
 /// [`DRAWS_PER_CANDIDATE`] times `count`, so that there may be fewer feasible candidates than asked for, or none. The
 /// result depends on the belief and on the stream alone, not on the number of threads.
-pub fn sample_by(belief: &Belief, pusher: &Pusher, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
-    match pusher {
-        Pusher::Free(tool) => sample(belief, tool, count, rng),
-        Pusher::Arm(arm) => {
-            let check = Check::Arm {
-                // What a rejected candidate would have swept is shown with the free tool's shape.
-                tool: Tool::standard(),
-                arm: ArmClearance::new(arm, belief),
-                seed: rng.random(),
-            };
-            sample_checked(belief, &check, count, rng)
-        }
-    }
-}
-
-/// What a push that a person thinks of would sweep: by the arm's motion for it, or in the shape of the free tool where
-/// there is no arm or it cannot carry the push out.
-pub fn swept_by(pusher: &Pusher, belief: &Belief, push: &Push) -> VoxelSet {
-    let motion = pusher.arm().and_then(|arm| {
-        let clearance = ArmClearance::new(arm, belief);
-        clearance.motion(push, &clearance.target_of(push), &mut stream(0, "push to look at", 0)).ok()
-    });
-    match (pusher, motion) {
-        (Pusher::Arm(arm), Some(motion)) => motion.swept_volume(&arm.arm, &belief.grid),
-        (Pusher::Free(tool), _) => tool.swept_volume(push, &belief.grid),
-        (Pusher::Arm(_), None) => Tool::standard().swept_volume(push, &belief.grid),
-    }
-}
-
-/// How candidates are checked.
-#[allow(clippy::large_enum_variant, reason = "there is one of it at a time, on the stack of one call")]
-enum Check<'a> {
-    Free { tool: &'a Tool, clearance: Clearance },
-    Arm { tool: Tool, arm: ArmClearance<'a>, seed: u64 },
-}
-
-impl Check<'_> {
-    /// How many frontier points are tried for each feasible candidate asked for.
-    fn draws_per_candidate(&self) -> usize {
-        match self {
-            Self::Free { .. } => DRAWS_PER_CANDIDATE,
-            Self::Arm { .. } => ARM_DRAWS_PER_CANDIDATE,
-        }
-    }
-
-    /// The tool whose shape a rejected candidate is shown with.
-    fn tool(&self) -> &Tool {
-        match self {
-            Self::Free { tool, .. } => tool,
-            Self::Arm { tool, .. } => tool,
-        }
-    }
-}
-
-fn sample_checked(belief: &Belief, check: &Check<'_>, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
+pub fn sample(belief: &Belief, arm: &ArmTool, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
     /// Draws that are checked together; fixed, so that it never matters who checks them.
     const BATCH: usize = 32;
+    let (seed, clearance) = (rng.random(), ArmClearance::new(arm, belief));
     let mut points = frontier(belief);
-    let draws = points.len().min(count * check.draws_per_candidate());
+    let draws = points.len().min(count * DRAWS_PER_CANDIDATE);
     let mut candidates = Vec::new();
     let mut feasible = 0;
     for first in (0..draws).step_by(BATCH) {
@@ -231,8 +166,10 @@ fn sample_checked(belief: &Belief, check: &Check<'_>, count: usize, rng: &mut Ch
                 (i as u64, points[i], draw_push(belief, points[i], rng))
             })
             .collect();
-        let checked: Vec<Candidate> =
-            drawn.into_par_iter().map(|(number, point, push)| candidate(belief, check, number, point, push)).collect();
+        let checked: Vec<Candidate> = drawn
+            .into_par_iter()
+            .map(|(number, point, push)| candidate(belief, &clearance, stream(seed, "arm", number), point, push))
+            .collect();
         for candidate in checked {
             if feasible < count {
                 feasible += usize::from(candidate.rejection.is_none());
@@ -260,30 +197,26 @@ fn draw_push(belief: &Belief, frontier: Voxel, rng: &mut ChaCha8Rng) -> Option<P
 }
 
 /// Checks a drawn push. One without a target is kept as the straight push that it would have been.
-fn candidate(belief: &Belief, check: &Check<'_>, number: u64, frontier: Voxel, push: Option<Push>) -> Candidate {
+fn candidate(
+    belief: &Belief,
+    clearance: &ArmClearance<'_>,
+    mut rng: ChaCha8Rng,
+    frontier: Voxel,
+    drawn: Option<Push>,
+) -> Candidate {
     let aimless = Push { start: start_of(belief, frontier), direction_deg: 90.0, length_m: LENGTH_M[0] };
-    let straight = push.unwrap_or(aimless);
-    let of = |swept, rejection, motion| Candidate {
-        frontier,
-        swept: SweptPush { push: straight, swept },
-        rejection,
-        motion,
+    let push = drawn.unwrap_or(aimless);
+    let motion = match drawn {
+        Some(_) => clearance.motion(&push, &clearance.target(frontier), &mut rng),
+        None => Err(Rejection::NoTarget),
     };
-    match (check, push) {
-        (check, None) => of(check.tool().swept_volume(&straight, &belief.grid), Some(Rejection::NoTarget), None),
-        (Check::Free { tool, clearance }, Some(push)) => {
-            let swept = tool.swept_volume(&push, &belief.grid);
-            let rejection = clearance.check(tool, &push, &swept, &clearance.target(frontier));
-            of(swept, rejection, None)
-        }
-        (Check::Arm { tool, arm, seed }, Some(push)) => {
-            let mut rng = stream(*seed, "arm", number);
-            match arm.motion(&push, &arm.target(frontier), &mut rng) {
-                Ok(motion) => of(motion.swept_volume(arm.arm(), &belief.grid), None, Some(motion)),
-                Err(rejection) => of(tool.swept_volume(&push, &belief.grid), Some(rejection), None),
-            }
-        }
-    }
+    let arm = clearance.tool();
+    let swept = match &motion {
+        Ok(motion) => motion.swept_volume(&arm.arm, &belief.grid),
+        Err(_) => gripper_along(arm, &push, &belief.grid),
+    };
+    let swept = SweptPush { push, swept };
+    Candidate { frontier, swept, rejection: motion.as_ref().err().cloned(), motion: motion.ok() }
 }
 
 #[cfg(test)]

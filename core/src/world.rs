@@ -1,4 +1,4 @@
-//! The simulated scene (rapier3d): bodies settle, a push is executed by the tool as a kinematic body, drops are
+//! The simulated scene (rapier3d): bodies settle, a push is executed by the arm as kinematic bodies, drops are
 //! detected. Deterministic: the same scene and the same pushes give the same poses, bit for bit, on one machine.
 
 mod arm;
@@ -12,18 +12,11 @@ pub use truth::TruthMap;
 use crate::arm::Joints;
 use crate::scene::{Body, ObjectId, Shelf};
 use crate::solid::Bounds;
-use crate::tool::{Push, Tool};
-use crate::{Point, Pose, Vector};
+use crate::{Point, Pose};
 use physics::Physics;
 
 /// Thickness of the shelf's panels outside its interior, metres.
 pub const PANEL_M: f32 = 0.02;
-/// Speed of the tip on the way in, metres per second.
-pub const APPROACH_M_S: f32 = 0.25;
-/// Speed of the tip while it pushes, metres per second.
-pub const PUSH_M_S: f32 = 0.10;
-/// Speed of the tip on the way back, metres per second.
-pub const RETREAT_M_S: f32 = 0.50;
 /// Longest simulated time that bodies are given to come to rest, seconds; what still moves then is stopped.
 pub const SETTLE_LIMIT_S: f32 = 4.0;
 
@@ -62,7 +55,7 @@ pub struct PushOutcome {
     pub dropped: Vec<ObjectId>,
     /// Simulated time, seconds.
     pub duration_s: f32,
-    /// Whether the tool was blocked (objects jammed against the shelf) and gave up before the push's end.
+    /// Whether the arm was blocked (objects jammed against the shelf) and gave up before the push's end.
     pub stalled: bool,
     /// How far the tip really moved along the push, metres.
     pub pushed_m: f32,
@@ -76,14 +69,6 @@ pub struct PushOutcome {
     pub arm_s: f32,
     /// The configurations that the arm passed until it turned back.
     pub passed: Vec<Joints>,
-}
-
-/// What became of the tool's way along one straight leg.
-struct Leg {
-    /// Where the tip ended.
-    tip: Point,
-    /// Whether the tool was blocked before the leg's end.
-    blocked: bool,
 }
 
 impl World {
@@ -120,64 +105,6 @@ impl World {
     /// How deep two bodies, or a body and the shelf, overlap at most, metres; 0 when nothing touches.
     pub fn deepest_overlap_m(&self) -> f32 {
         self.physics.deepest_overlap_m()
-    }
-
-    /// Carries out a push with the tool: in from before the shelf, along the push, back the same way, then settles.
-    ///
-    /// A tool that is blocked (on the way in or along the push) stops there, goes back and reports a stall. Contacts
-    /// are between tool and objects only; the tool does not feel the shelf.
-    pub fn execute(&mut self, tool: &Tool, push: &Push) -> PushOutcome {
-        let before = self.poses();
-        let dropped_before = self.dropped.clone();
-        let (outside, start) = (Tool::approach_point(push), push.start_point());
-        self.physics.begin();
-        let steps_before = self.physics.steps();
-        self.physics.insert_tool(tool, outside);
-
-        let way_in = self.move_tool(outside, start, APPROACH_M_S);
-        let mut tip = way_in.tip;
-        let mut stalled = way_in.blocked;
-        let mut pushed_m = 0.0;
-        if !stalled {
-            let along = self.move_tool(start, push.end_point(), PUSH_M_S);
-            tip = along.tip;
-            stalled = along.blocked;
-            pushed_m = (tip - start).norm();
-            // A tool that cannot even go back is taken away where it is: a real arm would give way.
-            if !self.move_tool(tip, start, RETREAT_M_S).blocked {
-                self.move_tool(start, outside, RETREAT_M_S);
-            }
-        } else {
-            self.move_tool(tip, outside, RETREAT_M_S);
-        }
-        self.physics.remove_tool();
-        self.come_to_rest();
-        self.read_back();
-
-        let ids = self.bodies.iter().zip(self.dropped.iter().zip(&dropped_before));
-        PushOutcome {
-            displacement_m: self.displacements(&before),
-            dropped: ids.filter(|(_, (now, before))| **now && !**before).map(|(body, _)| body.id).collect(),
-            duration_s: (self.physics.steps() - steps_before) as f32 * physics::TIME_STEP_S,
-            stalled,
-            pushed_m,
-            ..PushOutcome::default()
-        }
-    }
-
-    /// Moves the tool's tip straight from `from` to `to`; stops when it is blocked.
-    fn move_tool(&mut self, from: Point, to: Point, speed_m_s: f32) -> Leg {
-        let travel: Vector = to - from;
-        let steps = (travel.norm() / (speed_m_s * physics::TIME_STEP_S)).ceil() as usize;
-        let mut tip = from;
-        for step in 1..=steps {
-            tip = from + travel * (step as f32 / steps as f32);
-            if self.physics.step_tool(tip) {
-                return Leg { tip, blocked: step < steps };
-            }
-            self.note_drops();
-        }
-        Leg { tip, blocked: false }
     }
 
     fn come_to_rest(&mut self) {

@@ -2,12 +2,15 @@
 //!
 //! Each figure is the median of a few runs on this machine as it is; a target is for two idle cores.
 
-use nudge_core::belief::{BeliefUpdate, Classical};
+use nudge_core::arm::Push;
+use nudge_core::arm::{ArmTool, PushMotion};
+use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, ViewId, project, render};
 use nudge_core::episode::{Episode, EpisodeConfig};
 use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::push::ArmClearance;
+use nudge_core::rng::stream;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
-use nudge_core::tool::{Push, Tool};
 use nudge_core::world::{TruthMap, World};
 use nudge_tests::{nudge_bin, root};
 use std::hint::black_box;
@@ -85,16 +88,22 @@ fn fifteen_objects(catalog: &Catalog) -> Vec<Body> {
     scene.bodies(catalog).expect("bodies")
 }
 
-/// A push into the middle of the shelf, by the median over its directions.
+/// A push by the arm into a shelf with fifteen objects, by the median over where it goes in.
 fn push(scene: &Scene, bodies: &[Body]) -> f64 {
     let mut world = World::new(scene.shelf, bodies.to_vec());
     world.settle();
-    let tool = Tool::standard();
+    let (arm, belief) = (ArmTool::standard(scene.shelf), Belief::uniform(scene.grid()));
+    let clearance = ArmClearance::new(&arm, &belief);
+    let motions: Vec<PushMotion> = (0..9)
+        .filter_map(|at| {
+            let push = Push { start: [-0.2 + 0.05 * at as f32, 0.05, 0.06], direction_deg: 90.0, length_m: 0.15 };
+            clearance.motion(&push, &clearance.target_of(&push), &mut stream(1, "bench", at)).ok()
+        })
+        .collect();
     let mut at = 0;
-    median(9, || {
-        let push = Push { start: [-0.2 + 0.05 * at as f32, 0.05, 0.06], direction_deg: 90.0, length_m: 0.15 };
+    median(motions.len(), || {
         at += 1;
-        world.clone().execute(&tool, &push)
+        world.clone().execute(&arm.arm, &motions[at - 1])
     })
 }
 

@@ -139,20 +139,7 @@ fn an_episode_whose_arm_reaches_nothing_looks_and_says_why_it_never_pushes() {
     let folder = folder();
     let file = write(folder.path(), "far.toml", &scene("[robot]\nbase = [0.0, -3.0, -0.015]"));
     let out = folder.path().join("e");
-    let args = [
-        "run",
-        &file,
-        "--pushed-by",
-        "arm",
-        "--belief",
-        "classical",
-        "--policy",
-        "random-push-5",
-        "--budget",
-        "6",
-        "--json",
-        "--out",
-    ];
+    let args = ["run", &file, "--belief", "classical", "--policy", "random-push-5", "--budget", "6", "--json", "--out"];
     let output = nudge(&[&args[..], &[out.to_str().expect("utf-8")]].concat());
     assert!(output.status.success(), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("reaches no place before the shelf"), "{}", text(&output.stderr));
@@ -177,21 +164,8 @@ fn all_policies_push_through_the_arm_and_replay() {
         let out = folder.path().join(policy);
         let out = out.to_str().expect("utf-8");
         let scene = "scenes/high/key-blocker.toml";
-        let args = [
-            "run",
-            scene,
-            "--pushed-by",
-            "arm",
-            "--belief",
-            "classical",
-            "--policy",
-            policy,
-            "--budget",
-            budget,
-            "--json",
-            "--out",
-            out,
-        ];
+        let args =
+            ["run", scene, "--belief", "classical", "--policy", policy, "--budget", budget, "--json", "--out", out];
         let record: Value = serde_json::from_str(&nudge_ok(&args)).expect("JSON");
         let mut pushed = 0;
         for step in record["steps"].as_array().expect("steps") {

@@ -2,7 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
-use nudge_core::arm::{ArmTool, Pusher};
+use nudge_core::arm::ArmTool;
 use nudge_core::camera::ViewArray;
 use nudge_core::learn::{Card, Dataset, Job, Kind, MapSample, Progress, PushSample, Recipe, Sample, make};
 use nudge_core::scene::{Catalog, GenerateConfig};
@@ -79,14 +79,11 @@ fn make_data<S: Sample>(args: &MakeArgs, kind: Kind) -> anyhow::Result<()> {
         return Err(Error::Usage(format!("--noise {}: must be a share between 0 and 1", args.noise)).into());
     }
     let scenes = GenerateConfig { fill: args.fill.0, rho: args.rho, ..GenerateConfig::default() };
-    let pusher = match kind {
-        Kind::Maps => Pusher::default(),
-        Kind::Pushes => Pusher::Arm(Arc::new(ArmTool::standard(scenes.shelf))),
-    };
+    let arm = Arc::new(ArmTool::standard(scenes.shelf));
     let recipe = Recipe {
         catalog: Catalog::standard(),
         scenes,
-        pusher,
+        arm,
         views: ViewArray::named(&args.views)?,
         noise_share: args.noise,
     };

@@ -5,7 +5,7 @@ use crate::record::mishaps;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
-use nudge_core::plan::{Action, PlannerSettings, PolicyKind, PushedBy, Reason};
+use nudge_core::plan::{Action, PlannerSettings, PolicyKind, Reason};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::score::{Scores, Verdict};
 use std::path::PathBuf;
@@ -31,9 +31,6 @@ pub struct Args {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
-    /// What pushes: a tool that needs no arm, or the scene's arm, which also limits the views
-    #[arg(long, value_name = "tool|arm", default_value_t = PushedBy::default())]
-    pushed_by: PushedBy,
     /// Push candidates drawn per decision
     #[arg(long, default_value_t = PlannerSettings::default().candidates)]
     candidates: usize,
@@ -68,11 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.seed,
         budget: args.budget,
         views: args.views.clone(),
-        planner: PlannerSettings {
-            pushed_by: args.pushed_by,
-            candidates: args.candidates,
-            ..PlannerSettings::default()
-        },
+        planner: PlannerSettings { candidates: args.candidates, ..PlannerSettings::default() },
         noise: None,
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));
@@ -136,7 +129,6 @@ fn same_episode(
             ("--seed", config.seed.to_string()),
             ("--budget", config.budget.to_string()),
             ("--views", config.views.clone()),
-            ("--pushed-by", config.planner.pushed_by.to_string()),
             ("--candidates", config.planner.candidates.to_string()),
         ]
     };

@@ -168,15 +168,7 @@ fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
         feasible.len(),
         count(|r| matches!(r, Rejection::NoTarget)),
         count(|r| matches!(r, Rejection::Unreachable { .. })),
-        count(|r| {
-            matches!(
-                r,
-                Rejection::StartBlocked { .. }
-                    | Rejection::PathBlocked { .. }
-                    | Rejection::Shelf
-                    | Rejection::ArmBlocked { .. }
-            )
-        }),
+        count(|r| matches!(r, Rejection::ArmBlocked { .. })),
         count(|r| matches!(r, Rejection::NoWay)),
     );
     reasons(page, decision);

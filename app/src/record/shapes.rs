@@ -1,11 +1,11 @@
 //! Bodies, cameras and pushes as meshes, lines, images and arrows.
 
 use crate::colors::{self, Colormap, Rgb};
+use nudge_core::arm::Push;
 use nudge_core::camera::{Image, Intrinsics, View, ViewArray};
 use nudge_core::plan::Decision;
 use nudge_core::scene::{Body, Catalog, Shelf};
 use nudge_core::solid::ConvexPart;
-use nudge_core::tool::Push;
 use nudge_core::{Point, Pose, Vector};
 
 /// Images are recorded at half their size along both axes.

@@ -1,5 +1,6 @@
 use super::*;
 use crate::fixture;
+use nudge_core::arm::ArmTool;
 
 /// Where a test keeps its output: `NUDGE_KEEP` if that is set, else a directory that goes with the guard.
 fn output() -> (PathBuf, Option<tempfile::TempDir>) {
@@ -18,13 +19,14 @@ fn a_recording_stays_small_and_names_its_entities() {
     let played = fixture::play(steps);
     let (directory, _guard) = output();
     let path = directory.join("episode.rrd");
+    let arm = ArmTool::standard(played.record.scene.shelf);
     let setting = Setting {
         shelf: &played.record.scene.shelf,
         catalog: &played.catalog,
         views: &played.views,
         budget: steps,
         gamma: 0.2,
-        arm: None,
+        arm: &arm,
         unreachable: &[],
     };
     let mut recorder = Recorder::begin(&path, "test", &setting).expect("file");

@@ -2,9 +2,9 @@
 
 use super::model::{LayoutKind, Picked};
 use super::session::SessionId;
+use nudge_core::arm::Push;
 use nudge_core::plan::{Action, Decision};
 use nudge_core::score::Verdict;
-use nudge_core::tool::Push;
 use std::path::PathBuf;
 use std::sync::Arc;
 

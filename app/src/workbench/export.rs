@@ -118,7 +118,7 @@ fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Wa
     let arm = ArmTool::new(Arm::placed(&record.scene.robot)?, record.scene.shelf);
     let unreachable = session.setup.views.unreachable(&session.setup.views.hand_poses(&arm));
     let setting = Setting {
-        arm: Some(&arm),
+        arm: &arm,
         unreachable: &unreachable,
         shelf: &record.scene.shelf,
         catalog: &session.setup.catalog,

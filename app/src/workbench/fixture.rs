@@ -67,7 +67,6 @@ impl Script {
             catalog,
             views: Arc::new(episode.views().clone()),
             update,
-            pusher: episode.pusher(),
             arm: episode.arm().clone(),
             unreachable: Arc::new(episode.unreachable_views().to_vec()),
             hidden: Arc::new(vec!["tomato_can#1".to_owned()]),
@@ -165,7 +164,7 @@ pub fn answer(model: &mut Model) {
     let push =
         model.candidate.and_then(|at| session.decision_after(step)?.candidates.get(at)).map(|candidate| candidate.push);
     let preview = push.map(|push| {
-        let swept = swept_by(&session.setup.pusher, &belief, &push);
+        let swept = swept_by(&session.setup.arm, &belief, &push);
         let pushes = [SweptPush { push, swept: swept.clone() }];
         let prediction = session.setup.update.predict_pushes(&belief, &pushes).remove(0);
         Preview { of: (session.id, step), push, prediction: Arc::new(prediction), swept: Arc::new(swept) }

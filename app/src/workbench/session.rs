@@ -2,7 +2,7 @@
 
 use super::annotations::Annotations;
 use super::half_belief::HalfBelief;
-use nudge_core::arm::{ArmTool, Pusher};
+use nudge_core::arm::ArmTool;
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::{EpisodeRecord, StepOutcome};
@@ -71,8 +71,6 @@ pub struct Setup {
     pub views: Arc<ViewArray>,
     /// How beliefs change.
     pub update: Arc<dyn BeliefUpdate>,
-    /// What carries pushes out.
-    pub pusher: Pusher,
     /// The arm before the shelf.
     pub arm: Arc<ArmTool>,
     /// Views that its hand cannot be at.

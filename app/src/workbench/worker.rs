@@ -370,7 +370,6 @@ fn opened(path: &Path, episode: &Episode, moments: Vec<Arc<Moment>>, read_only: 
         catalog: Arc::new(episode.catalog().clone()),
         views: Arc::new(views),
         update: update_named(&record.config.belief, &record.config)?,
-        pusher: episode.pusher(),
         arm: episode.arm().clone(),
         unreachable: Arc::new(episode.unreachable_views().to_vec()),
         hidden: Arc::new(hidden.iter().map(name).collect()),

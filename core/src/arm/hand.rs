@@ -4,7 +4,7 @@
 //! clear of table, shelf and the arm itself (upright, or upside down), and there is a way to it from where the arm waits. While it looks the arm
 //! stays out of the shelf altogether, whatever may stand in it.
 
-use super::plan::{PlanSettings, plan};
+use super::plan::{PlanSettings, plan, turned};
 use super::pusher::ArmTool;
 use super::segment::is_segment_free;
 use super::shortcut::shortcut;
@@ -101,7 +101,8 @@ impl ArmTool {
             let Some(view) = order.get(failed * order.len() / SEARCHES).copied().filter(|_| failed < SEARCHES) else {
                 break;
             };
-            let goals: Vec<Vec<Joints>> = places[view].iter().map(|joints| vec![*joints]).collect();
+            let goals: Vec<Vec<Joints>> =
+                places[view].iter().flat_map(|joints| turned(&self.arm, &[*joints])).collect();
             match plan(&space, &ready, &goals, QUERY, &mut stream(0, "ways of the hand", pass as u64)) {
                 Some(planned) => {
                     let hand = HandPose { way: planned.path };

@@ -1,11 +1,10 @@
-//! What carries pushes out: the arm, or a tool that flies.
+//! What carries pushes out: an arm before its shelf, and its motion for one push.
 
 use super::{Arm, Joints, Motion, Space};
+use crate::arm::Push;
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::{RobotPlacement, Shelf};
-use crate::tool::{Push, Tool};
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// Speed of the tip on the way to a push, metres per second.
 pub const WAY_IN_M_S: f64 = 0.25;
@@ -13,31 +12,6 @@ pub const WAY_IN_M_S: f64 = 0.25;
 pub const PUSH_M_S: f64 = 0.10;
 /// Speed of the tip on the way back, metres per second.
 pub const WAY_BACK_M_S: f64 = 0.50;
-
-/// What carries pushes out.
-#[derive(Clone, Debug)]
-pub enum Pusher {
-    /// A gripper with two links that comes in straight and needs no arm.
-    Free(Tool),
-    /// An arm before the shelf.
-    Arm(Arc<ArmTool>),
-}
-
-impl Default for Pusher {
-    fn default() -> Self {
-        Self::Free(Tool::standard())
-    }
-}
-
-impl Pusher {
-    /// The arm, if one pushes.
-    pub fn arm(&self) -> Option<&ArmTool> {
-        match self {
-            Self::Free(_) => None,
-            Self::Arm(arm) => Some(arm),
-        }
-    }
-}
 
 /// An arm with the shelf that it pushes in and the place where it waits.
 #[derive(Clone, Debug)]

@@ -1,9 +1,10 @@
 //! The space that an arm sweeps: every voxel that one of its parts touches along a way.
 
-use super::{Arm, DistanceField, Frame, Joints, Role, pose_of};
+use super::{Arm, DistanceField, Frame, Joints, Part, Role, pose_of};
 use crate::grid::{Cell, Grid, VoxelSet};
 use crate::solid::{Bounds, ConvexPart, HalfSpace, levels_inside};
 use crate::{Pose, Vector};
+use nalgebra::Vector3;
 
 /// Largest movement of the tool between two poses whose voxels are taken, metres.
 const STEP_M: f64 = 0.005;
@@ -33,8 +34,7 @@ impl Arm {
         blocked: impl Fn(usize) -> bool,
     ) -> Option<usize> {
         let world_from_last = world_from_tool * self.last_from_tool.inverse();
-        let parts = self.bodies.last()?.iter().filter(|part| part.role == Role::Tool);
-        for part in parts {
+        for part in self.gripper() {
             if field.distance_m(&(world_from_last * part.around.center)) > part.around.radius_m {
                 continue;
             }
@@ -49,6 +49,23 @@ impl Arm {
             }
         }
         None
+    }
+
+    /// Adds every voxel that the gripper alone touches when it is moved straight along `travel` with its tip from `from`.
+    pub fn sweep_gripper(&self, from: &Frame, travel: &Vector3<f64>, grid: &Grid, swept: &mut VoxelSet) {
+        let steps = (travel.norm() / STEP_M).ceil().max(1.0);
+        for step in 0..=steps as usize {
+            let at = from.translation.vector + travel * (step as f64 / steps);
+            let world_from_last = Frame::from_parts(at.into(), from.rotation) * self.last_from_tool.inverse();
+            for part in self.gripper() {
+                voxels_of(grid, &part.shape, &pose_of(&world_from_last), |index| swept.insert(index));
+            }
+        }
+    }
+
+    /// The parts of the gripper.
+    fn gripper(&self) -> impl Iterator<Item = &Part> {
+        self.bodies.last().into_iter().flatten().filter(|part| part.role == Role::Tool)
     }
 
     fn tool_travel_m(&self, a: &Joints, b: &Joints) -> f64 {

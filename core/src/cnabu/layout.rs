@@ -7,11 +7,11 @@
 //!
 //! Evidence goes in as its logarithm, which squashes it and is 0 for the uniform prior.
 
+use crate::arm::Push;
 use crate::belief::Belief;
 use crate::camera::{MapObservation, UNOBSERVED};
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::CLASS_COUNT;
-use crate::tool::Push;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -337,6 +337,16 @@ mod tests {
         };
         assert_eq!(planes(&flipped, Mirror::X), planes(&set, Mirror::No));
         assert_ne!(planes(&set, Mirror::X), planes(&set, Mirror::No));
+
+        // Evidence turned round as a whole is the same as planes of what is turned round.
+        let [x, y] = layout.pixels().map(|n| n as i64);
+        let as_evidence = |planes: &[f32]| {
+            let occupancy = tch::Tensor::from_slice(planes).reshape([1, OCCUPANCY as i64, x, y]);
+            super::super::Evidence { semantics: occupancy.shallow_clone(), occupancy }
+        };
+        let turned = as_evidence(&planes(&set, Mirror::No)).mirrored();
+        let expected = as_evidence(&planes(&set, Mirror::X));
+        assert!(turned.occupancy.equal(&expected.occupancy) && turned.semantics.equal(&expected.semantics));
     }
 
     #[test]

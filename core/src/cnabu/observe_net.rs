@@ -50,6 +50,21 @@ impl Evidence {
         let log = |z: &Tensor| z.detach().softplus().clamp_max_(LOG_EVIDENCE_LIMIT);
         Self { occupancy: log(z_occupancy), semantics: log(z_semantics) }
     }
+
+    /// The same with numbers of another kind.
+    pub fn to_kind(&self, kind: Kind) -> Self {
+        Self { occupancy: self.occupancy.to_kind(kind), semantics: self.semantics.to_kind(kind) }
+    }
+
+    /// The same with left and right exchanged; for planes without padding.
+    pub fn mirrored(&self) -> Self {
+        let mirrored = |planes: &Tensor| {
+            let size = planes.size();
+            // A channel is a quantity and a sub-cell `2 (x % 2) + y % 2`; along x both pixels and sub-cells turn round.
+            planes.view([size[0], -1, 2, 2, size[2], size[3]]).flip([2, 4]).view(&size[..])
+        };
+        Self { occupancy: mirrored(&self.occupancy), semantics: mirrored(&self.semantics) }
+    }
 }
 
 /// The network sigma_o.

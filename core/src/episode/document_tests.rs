@@ -73,7 +73,7 @@ proptest! {
         record.config.planner.gamma = gamma;
         record.steps[0].decision.gains = gains.clone();
         record.steps[1].scores.entropy_nats = entropy;
-        let push = crate::tool::Push { start, direction_deg: gains[0], length_m };
+        let push = crate::arm::Push { start, direction_deg: gains[0], length_m };
         record.steps[1].action = crate::plan::Action::Push(push);
         record.steps[1].decision.action = record.steps[1].action;
         record.steps[1].decision.candidates[0].push = push;

@@ -3,16 +3,16 @@
 use super::record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
-use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion, Pusher};
+use crate::arm::Push;
+use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
-use crate::grid::{Grid, VoxelSet};
-use crate::plan::{self, Action, Decision, History, PushedBy, Reason, Situation};
+use crate::grid::Grid;
+use crate::plan::{self, Action, Decision, History, Reason, Situation};
 use crate::push::ArmClearance;
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::score::{Scores, object_verdicts};
-use crate::tool::{Push, Tool};
 use crate::world::{PushOutcome, TruthMap, World};
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -25,7 +25,6 @@ pub struct Episode {
     catalog: Arc<Catalog>,
     update: Arc<dyn BeliefUpdate>,
     views: Arc<ViewArray>,
-    tool: Arc<Tool>,
     arm: Arc<ArmTool>,
     /// How the hand gets to each view; `None` where it cannot be.
     hands: Arc<Vec<Option<HandPose>>>,
@@ -65,8 +64,7 @@ impl Episode {
         let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         let hands = Arc::new(views.hand_poses(&arm));
-        let by_arm = config.planner.pushed_by == PushedBy::Arm;
-        let unreachable = Arc::new(if by_arm { views.unreachable(&hands) } else { Default::default() });
+        let unreachable = Arc::new(views.unreachable(&hands));
         let mut world = World::new(scene.shelf, scene.bodies(&catalog)?);
         world.settle();
         let bodies = Arc::new(world.bodies());
@@ -85,8 +83,7 @@ impl Episode {
             catalog,
             update,
             views,
-            tool: Arc::new(Tool::standard()),
-            hand: arm.ready.map(HandPose::waiting).filter(|_| by_arm),
+            hand: arm.ready.map(HandPose::waiting),
             arm,
             hands,
             unreachable,
@@ -107,12 +104,11 @@ impl Episode {
             Some(view) => self.update.observe(&self.belief, &self.observe(view).1),
             None => (*self.belief).clone(),
         };
-        let pusher = self.pusher();
         let situation = Situation {
             belief: &self.belief,
             update: &*self.update,
             views: &self.views,
-            pusher: &pusher,
+            arm: &self.arm,
             unreachable: &self.unreachable,
             history: &self.history,
             budget: self.record.config.budget,
@@ -178,27 +174,15 @@ impl Episode {
             return Err(Error::Usage(format!("a push must be a finite motion, not {numbers:?}")));
         }
         let started = Instant::now();
-        let (outcome, swept, motion): (PushOutcome, _, _) = match self.record.config.planner.pushed_by {
-            PushedBy::Tool => {
-                let tool = self.tool.clone();
-                (self.world.execute(&tool, &push), tool.swept_volume(&push, &self.grid()), None)
-            }
-            PushedBy::Arm => {
-                let arm = self.arm.clone();
-                let motion = self.motion_for(&arm, &mut decision, &push)?;
-                let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
-                let outcome = self.world.execute_motion(&arm.arm, &motion);
-                // The arm knows how far it came: what it did not sweep is not believed to be free.
-                let mut swept = VoxelSet::empty(&self.grid());
-                arm.arm.sweep(&outcome.passed, &self.grid(), &mut swept);
-                (outcome, swept, Some((to_wait.duration_s(), to_wait.then(&motion.whole(&arm.arm)))))
-            }
-        };
+        let arm = self.arm.clone();
+        let motion = self.motion_for(&arm, &mut decision, &push)?;
+        let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
+        let outcome = self.world.execute(&arm.arm, &motion);
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        let done = if outcome.stalled { Push { length_m: outcome.pushed_m.min(push.length_m), ..push } } else { push };
-        let swept = SweptPush { push: done, swept };
+        // The arm knows how far it came: what it did not sweep is not believed to be free.
+        let swept = SweptPush::done(&push, &outcome, &arm.arm, &self.grid());
         let prediction = self.predict(&swept, decision.reason);
         if let Some(prediction) = &prediction {
             Arc::make_mut(&mut self.belief).apply(prediction);
@@ -208,7 +192,7 @@ impl Episode {
         let happened = Happened {
             dropped: outcome.dropped.clone(),
             displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
-            motion_s: motion.as_ref().map_or(0.0, |(to_wait_s, _)| to_wait_s + f64::from(outcome.arm_s)),
+            motion_s: to_wait.duration_s() + f64::from(outcome.arm_s),
             push: Some(self.report(&outcome)),
         };
         let record = self.file(decision, happened, started, seconds);
@@ -219,7 +203,7 @@ impl Episode {
             swept: Some(swept),
             prediction,
             push_outcome: Some(outcome),
-            motion: motion.map(|(_, motion)| motion),
+            motion: Some(to_wait.then(&motion.whole(&arm.arm))),
         })
     }
 
@@ -374,19 +358,6 @@ impl Episode {
         &self.arm
     }
 
-    /// What carries pushes out.
-    pub fn pusher(&self) -> Pusher {
-        match self.record.config.planner.pushed_by {
-            PushedBy::Tool => Pusher::Free((*self.tool).clone()),
-            PushedBy::Arm => Pusher::Arm(self.arm.clone()),
-        }
-    }
-
-    /// Whether the arm pushes and carries the camera.
-    pub fn is_by_arm(&self) -> bool {
-        self.record.config.planner.pushed_by == PushedBy::Arm
-    }
-
     /// Per view, how the hand gets there; `None` where it cannot be.
     pub fn hand_poses(&self) -> &[Option<HandPose>] {
         &self.hands
@@ -402,12 +373,7 @@ impl Episode {
     pub fn why_no_push(&self) -> Option<String> {
         let name = &self.arm.arm.name;
         let words = || format!("{name} reaches no place before the shelf from where it stands, so nothing is pushed");
-        (self.is_by_arm() && self.arm.ready.is_none()).then(words)
-    }
-
-    /// The shape that stands for gripper and last links where no motion of the arm is known.
-    pub fn tool(&self) -> &Tool {
-        &self.tool
+        self.arm.ready.is_none().then(words)
     }
 
     /// The catalogue.

@@ -103,7 +103,7 @@ fn deciding_changes_nothing_and_a_clone_is_a_branch() {
 
 #[test]
 fn what_cannot_be_done_is_refused_and_changes_nothing() {
-    let mut episode = synthetic::episode_with(synthetic::config_by_arm(PolicyKind::Random, 1));
+    let mut episode = synthetic::episode_with(synthetic::config(PolicyKind::Random, 1));
     let before = episode.record().clone();
     let push = |push: Push| manual(Action::Push(push));
     let refused = [
@@ -156,7 +156,7 @@ fn a_drop_is_recorded_and_ends_the_pushing() {
     // A can that stands over the edge, 2 cm of its radius of 3.3 cm on the board, hooked from behind and pulled out.
     let mut scene = synthetic::cluttered_scene();
     scene.objects = vec![crate::scene::Object::new("tomato_can", [0.0, 0.02], 0.0)];
-    let config = synthetic::config_by_arm(PolicyKind::Mem, 6);
+    let config = synthetic::config(PolicyKind::Mem, 6);
     let catalog = Arc::new(Catalog::standard());
     let mut episode = Episode::new(scene, catalog, config, Arc::new(crate::belief::Classical)).expect("an episode");
     let push = Push { start: [0.02, 0.09, 0.06], direction_deg: -80.0, length_m: 0.15 };

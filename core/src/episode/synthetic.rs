@@ -3,14 +3,14 @@
 
 use super::machine::Episode;
 use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, StepRecord, StepSeconds};
+use crate::arm::Push;
 use crate::belief::{Belief, Classical};
 use crate::camera::ViewId;
-use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, PushedBy, Reason};
-use crate::push::Rejection;
+use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
+use crate::push::{Rejection, Stage};
 use crate::rng;
 use crate::scene::{BACKGROUND, CLASS_COUNT, Catalog, Object, Scene, Shelf};
 use crate::score::{ObjectVerdict, Scores, Verdict};
-use crate::tool::Push;
 use crate::world::TruthMap;
 use rand::Rng;
 use std::sync::Arc;
@@ -55,7 +55,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
             },
             CandidateRecord {
                 push,
-                rejection: Some(Rejection::StartBlocked { at: [0.1, 0.2, 0.3] }),
+                rejection: Some(Rejection::Unreachable { stage: Stage::Start }),
                 gain: None,
                 view: None,
                 reg: None,
@@ -168,12 +168,6 @@ pub fn config(policy: PolicyKind, budget: usize) -> EpisodeConfig {
         planner: PlannerSettings { candidates: 12, ..PlannerSettings::default() },
         noise: None,
     }
-}
-
-/// The same with the scene's arm in place of a tool.
-pub fn config_by_arm(policy: PolicyKind, budget: usize) -> EpisodeConfig {
-    let plain = config(policy, budget);
-    EpisodeConfig { planner: PlannerSettings { pushed_by: PushedBy::Arm, ..plain.planner }, ..plain }
 }
 
 /// A classical episode on the cluttered scene.

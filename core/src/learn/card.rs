@@ -1,7 +1,6 @@
 //! The card of a data directory: everything that its samples follow from.
 
 use super::{Recipe, SAMPLES_PER_SHARD, VIEWS};
-use crate::arm::Pusher;
 use crate::files::write_atomically;
 use crate::grid::Grid;
 use crate::{Error, Result};
@@ -64,7 +63,7 @@ pub struct Card {
     pub rho: f32,
     /// Share of samples with sensor noise.
     pub noise_share: f32,
-    /// What carried out the pushes: `arm`, or `free` for a tool that flies; maps have none.
+    /// The arm that carried out the pushes; maps have `none`.
     #[serde(default = "no_pusher")]
     pub pusher: String,
 }
@@ -93,10 +92,9 @@ impl Card {
             fill: recipe.scenes.fill,
             rho: recipe.scenes.rho,
             noise_share: recipe.noise_share,
-            pusher: match (kind, &recipe.pusher) {
-                (Kind::Maps, _) => no_pusher(),
-                (Kind::Pushes, Pusher::Free(_)) => "free".to_owned(),
-                (Kind::Pushes, Pusher::Arm(_)) => "arm".to_owned(),
+            pusher: match kind {
+                Kind::Maps => no_pusher(),
+                Kind::Pushes => recipe.arm.arm.name.clone(),
             },
         }
     }

@@ -2,7 +2,7 @@
 
 use super::bytes::{Reader, put_set};
 use super::{Kind, Sample, VIEWS};
-use crate::arm::Pusher;
+use crate::arm::ArmTool;
 use crate::camera::{MapObservation, NoiseModel, ViewArray, ViewId, project};
 use crate::grid::{Grid, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
@@ -11,6 +11,7 @@ use crate::world::{TruthMap, World};
 use crate::{Error, Result};
 use rand::Rng;
 use rand::seq::index;
+use std::sync::Arc;
 
 /// What samples are made of, beside their seeds.
 #[derive(Clone, Debug)]
@@ -21,8 +22,8 @@ pub struct Recipe {
     pub scenes: GenerateConfig,
     /// The views that observations are drawn from.
     pub views: ViewArray,
-    /// What carries out the pushes of push samples.
-    pub pusher: Pusher,
+    /// The arm that carries out the pushes of push samples.
+    pub arm: Arc<ArmTool>,
     /// Share of samples that are observed with [`NoiseModel::STANDARD`]; the others are without noise.
     pub noise_share: f32,
 }

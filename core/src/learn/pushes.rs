@@ -3,17 +3,20 @@
 //!
 //! Pushes are sampled as the planner samples them, from the classical belief after the sample's views, and carried out
 //! by the arm in copies of the same world. Pushes that drop an object are left out: an episode pushes no more after one.
+//!
+//! sigma_m is asked twice about a push: when it is weighed, with what it is planned to sweep, and when it is done, with
+//! what it really swept. The two differ where the arm was blocked; of such pushes, every other sample has the latter.
 
 use super::bytes::{Reader, put_set};
 use super::maps::{occupied, put_views, take_views};
 use super::{Kind, Recipe, Sample, VIEWS, ViewSample};
 use crate::Result;
-use crate::arm::Pusher;
+use crate::arm::ArmTool;
+use crate::arm::Push;
 use crate::belief::{Belief, BeliefUpdate, Classical, SweptPush};
 use crate::grid::{Grid, VoxelSet};
 use crate::push::{self, Candidate};
 use crate::rng::stream;
-use crate::tool::Push;
 use crate::world::{TruthMap, World};
 use rand::Rng;
 
@@ -79,28 +82,31 @@ impl PushSample {
         let belief =
             views.iter().fold(Belief::uniform(grid), |belief, view| Classical.observe(&belief, &view.observation));
         let mut rng = stream(scene_seed, "sample pushes", 0);
-        let candidates = push::sample_by(&belief, &recipe.pusher, PUSHES, &mut rng);
+        let candidates = push::sample(&belief, &recipe.arm, PUSHES, &mut rng);
         let pushes = candidates
             .into_iter()
             .filter(|candidate| candidate.rejection.is_none())
-            .filter_map(|candidate| pushed(&grid, &world, &recipe.pusher, candidate))
+            .filter_map(|candidate| pushed(&grid, &world, &recipe.arm, candidate, seed % 2 == 1))
             .collect();
         Ok(Self { seed, truth: occupied(&grid, &truth), labels: truth.labels, views, pushes })
     }
 }
 
-/// Carries out a push in a copy of the world; `None` when an object drops, or when the arm has no motion for it.
-fn pushed(grid: &Grid, world: &World, pusher: &Pusher, candidate: Candidate) -> Option<PushedSample> {
+/// Carries out a push in a copy of the world, and says what it was planned to sweep or, `as_done`, what it really swept;
+/// `None` when an object drops.
+fn pushed(grid: &Grid, world: &World, arm: &ArmTool, candidate: Candidate, as_done: bool) -> Option<PushedSample> {
     let mut world = world.clone();
-    let outcome = match pusher {
-        Pusher::Free(tool) => world.execute(tool, &candidate.swept.push),
-        Pusher::Arm(arm) => world.execute_motion(&arm.arm, candidate.motion.as_ref()?),
-    };
+    let outcome = world.execute(&arm.arm, candidate.motion.as_ref()?);
     if !outcome.dropped.is_empty() {
         return None;
     }
+    let push = if as_done && outcome.stalled {
+        SweptPush::done(&candidate.swept.push, &outcome, &arm.arm, grid)
+    } else {
+        candidate.swept
+    };
     let truth = TruthMap::of(grid, &world.bodies());
-    Some(PushedSample { push: candidate.swept, truth: occupied(grid, &truth), labels: truth.labels })
+    Some(PushedSample { push, truth: occupied(grid, &truth), labels: truth.labels })
 }
 
 impl Sample for PushSample {

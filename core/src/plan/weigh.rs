@@ -5,7 +5,7 @@ use crate::arm::PushMotion;
 use crate::belief::{Belief, PushPrediction, SweptPush};
 use crate::camera::ViewId;
 use crate::gain::{GainField, RayDensity, RayGains, gain_of_views};
-use crate::push::{Candidate, sample_by};
+use crate::push::{Candidate, sample};
 use crate::rng::{ChaCha8Rng, stream};
 
 /// About how many views rank the candidates: every 5th of 300, all of an array that has fewer than twice as many.
@@ -33,7 +33,7 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
 /// list of used views, so every view counts.
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
-    let drawn = sample_by(belief, situation.pusher, settings.candidates, &mut push_stream(situation));
+    let drawn = sample(belief, situation.arm, settings.candidates, &mut push_stream(situation));
     let mut candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let mut motions: Vec<Option<PushMotion>> = drawn.iter().map(|drawn| drawn.motion.clone()).collect();
     let (feasible, pushes): (Vec<usize>, Vec<SweptPush>) = drawn
@@ -77,7 +77,7 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
 
 /// Draws one feasible push at random, with those that were rejected on the way.
 pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
-    let mut drawn = sample_by(situation.belief, situation.pusher, 1, &mut push_stream(situation));
+    let mut drawn = sample(situation.belief, situation.arm, 1, &mut push_stream(situation));
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
     let motion = best.and_then(|at| drawn[at].motion.take());
@@ -90,8 +90,7 @@ fn push_stream(situation: &Situation<'_>) -> ChaCha8Rng {
 
 fn record_of(candidate: &Candidate, situation: &Situation<'_>) -> CandidateRecord {
     let rejection = candidate.rejection.clone();
-    let arm = situation.pusher.arm();
-    let motion_s = arm.and_then(|arm| candidate.motion.as_ref().map(|motion| motion.duration_s(&arm.arm)));
+    let motion_s = candidate.motion.as_ref().map(|motion| motion.duration_s(&situation.arm.arm));
     CandidateRecord { push: candidate.swept.push, rejection, gain: None, view: None, reg: None, motion_s }
 }
 

@@ -1,82 +1,245 @@
-//! Whether the tool can go where a push wants it, as far as the belief knows.
+//! Whether the arm can carry a push out: it reaches the start, follows the line, and there is a free way there.
+//!
+//! The gripper is level and points into the shelf, straight or turned a little ([`YAWS_DEG`]). For each turn and each
+//! branch of the inverse: the start pose must be free, the line is followed without leaving the branch, then the arm
+//! backs straight out of the shelf; where that is not free all the way, the planner looks for a way from where the arm
+//! waits to where backing out ended. Contact is allowed only between the gripper and the object that is pushed.
 
-use super::{CONFIDENT, Rejection};
-use crate::Pose;
+use super::{CONFIDENT, Rejection, STANDOFF_M, Stage};
+use crate::arm::{
+    Arm, ArmTool, DistanceField, Follow, Frame, Hit, Joints, Obstacle, PlanSettings, Push, PushMotion, Space, YAWS_DEG,
+    follow_line, level_tool, plan, turned,
+};
 use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, beta_mean};
 use crate::grid::{Cell, Grid, Voxel, VoxelSet};
-use crate::tool::{Push, Tool};
+use crate::rng::ChaCha8Rng;
+use nalgebra::{Translation3, Vector3};
 
-/// How finely the path is walked to tell where it is blocked, metres.
-const STEP_M: f32 = 0.005;
-/// Contact that is shallower than this is none, metres: a tool that slides along a wall or a voxel's face is free.
-const TOUCH_M: f32 = 1e-5;
+/// How far before the shelf's front edge (y = 0) the finger tip must come for the arm to be out of it, metres.
+const CLEARANCE_M: f32 = 0.02;
+/// Occupancy probability above which the arm keeps away from a voxel.
+pub const AVOIDED: f32 = 0.7;
+/// Ways from the waiting place that the planner searches for, per push, where none is straight.
+const QUERIES: usize = 1;
+/// Distance of the gripper's poses that are checked along a line, metres: two voxels of the standard grid.
+const GRIPPER_STEP_M: f64 = 0.01;
+/// Branches of the inverse that are tried per turn, those nearest to where the arm waits first.
+const BRANCHES: usize = 3;
+/// Ways in that are tried per push.
+const ATTEMPTS: usize = 3;
+/// A query that only tries straight ways.
+const STRAIGHT: PlanSettings = PlanSettings { rounds: 0, shortcuts: 0 };
+/// Work of one query: a push that takes long to plan is one that another push can replace.
+const QUERY: PlanSettings = PlanSettings { rounds: 40, shortcuts: 10 };
 
-/// What a belief is sure of, prepared for checking many pushes.
-pub struct Clearance {
+/// A belief prepared for checking many pushes by an arm.
+pub struct ArmClearance<'a> {
+    tool: &'a ArmTool,
     grid: Grid,
-    confident: VoxelSet,
     plan: FloorPlan,
+    avoided: VoxelSet,
+    field: DistanceField,
+    confident: VoxelSet,
+    confident_field: DistanceField,
+    ready: Option<Joints>,
 }
 
-impl Clearance {
-    /// Collects the belief's high-confidence voxels.
-    pub fn new(belief: &Belief) -> Self {
+impl<'a> ArmClearance<'a> {
+    /// Collects the voxels that the arm keeps away from and the distances to them.
+    pub fn new(tool: &'a ArmTool, belief: &Belief) -> Self {
+        let mut avoided = VoxelSet::empty(&belief.grid);
         let mut confident = VoxelSet::empty(&belief.grid);
         for (index, a) in belief.occupancy.iter().enumerate() {
-            if beta_mean(*a) >= CONFIDENT {
+            let probability = beta_mean(*a);
+            if probability > AVOIDED {
+                avoided.insert(index);
+            }
+            if probability >= CONFIDENT {
                 confident.insert(index);
             }
         }
-        Self { grid: belief.grid, confident, plan: FloorPlan::new(belief, CONFIDENT) }
+        let field = DistanceField::new(&belief.grid, &avoided);
+        let confident_field = DistanceField::new(&belief.grid, &confident);
+        let plan = FloorPlan::new(belief, AVOIDED);
+        Self { tool, grid: belief.grid, plan, avoided, field, confident, confident_field, ready: tool.ready }
     }
 
-    /// The object that a frontier voxel belongs to; the tool may touch what stands on its cells.
+    /// The object that a frontier voxel belongs to; the gripper may touch what stands on its cells.
     pub fn target(&self, frontier: Voxel) -> Patch {
         self.plan.patch(self.grid.cell_index(Cell { x: frontier.x, y: frontier.y }), OBJECT_RADIUS_M)
     }
 
-    /// Why the push that sweeps `swept` cannot be carried out, or `None` if it can.
+    /// The object that a push meets first: the first cell along the tip's track over which something is believed to
+    /// stand, as high as the tip; the cell before the start where there is none.
+    pub fn target_of(&self, push: &Push) -> Patch {
+        let step = 0.5 * self.grid.voxel_m;
+        let steps = (push.length_m / step).ceil() as usize;
+        let track = (0..=steps).map(|i| push.start_point() + push.direction() * (step * i as f32));
+        let met =
+            track.filter_map(|point| self.grid.voxel_at(point)).find(|v| self.avoided.contains(self.grid.index(*v)));
+        let ahead = push.start_point() + push.direction() * STANDOFF_M;
+        let voxel = met.or_else(|| self.grid.voxel_at(ahead)).unwrap_or(Voxel { x: 0, y: 0, z: 0 });
+        self.target(voxel)
+    }
+
+    /// The arm.
+    pub fn tool(&self) -> &'a ArmTool {
+        self.tool
+    }
+
+    /// The arm among what the belief is sure of.
+    pub fn space(&self) -> Space<'_> {
+        self.tool.space().with_map(&self.avoided, &self.field)
+    }
+
+    /// The arm's motion for a push against `target`, or why there is none.
     ///
-    /// Neither the start pose nor the way in nor the push may touch the shelf or a high-confidence voxel that is not the
-    /// target's; that holds for the gripper and for the links that trail behind it. What the target itself runs into is
-    /// not asked.
-    pub fn check(&self, tool: &Tool, push: &Push, swept: &VoxelSet, target: &Patch) -> Option<Rejection> {
-        let path = tool.path(push, STEP_M);
-        if path.iter().any(|pose| self.touches_shelf(tool, pose)) {
-            return Some(Rejection::Shelf);
+    /// The gripper may touch the target and nothing else that the belief is sure of ([`CONFIDENT`]); that is asked first,
+    /// since it does not depend on how the arm bends. All other links keep away from what is likely ([`AVOIDED`]). Of the
+    /// turns and branches that fail, the one that came farthest gives the reason.
+    pub fn motion(&self, push: &Push, target: &Patch, rng: &mut ChaCha8Rng) -> Result<PushMotion, Rejection> {
+        let Some(ready) = self.ready else { return Err(Rejection::Unreachable { stage: Stage::Start }) };
+        let arm = &self.tool.arm;
+        let space = self.space();
+        let pushing = space.pushing();
+        let tip = push.start_point().map(f64::from);
+        let travel = push.direction().map(f64::from) * f64::from(push.length_m);
+        // Straight out of the shelf, and on until the tip is as far before it as where the arm waits.
+        let least = tip.y + f64::from(CLEARANCE_M);
+        let out = least.max(tip.y - arm.world_from_tool(&ready).translation.y).max(0.0);
+        let mut reason = Reason { depth: 0, rejection: Rejection::Unreachable { stage: Stage::Start } };
+        let mut goals: Vec<Attempt> = Vec::new();
+        for yaw in YAWS_DEG {
+            let pose = level_tool(&tip, yaw.to_radians());
+            if let Some(hit) = self.gripper_hit(&pose, &Vector3::zeros(), target).1 {
+                reason.deeper(1, blocked(Stage::Start, hit));
+                continue;
+            }
+            if let Some(hit) = self.gripper_hit(&pose, &travel, target).1 {
+                reason.deeper(2, blocked(Stage::Push, hit));
+                continue;
+            }
+            let (free, out_hit) = self.gripper_hit(&pose, &Vector3::new(0.0, -out, 0.0), target);
+            for start in arm.inverse(&pose, &ready).into_iter().take(BRANCHES) {
+                if goals.len() == ATTEMPTS {
+                    break;
+                }
+                if let Some(hit) = pushing.hit(&start) {
+                    reason.deeper(1, blocked(Stage::Start, hit));
+                    continue;
+                }
+                let (line, hit) = self.follow(&pushing, &start, &travel);
+                if !line.complete {
+                    let unreachable = Rejection::Unreachable { stage: Stage::Push };
+                    reason.deeper(2, hit.map_or(unreachable, |hit| blocked(Stage::Push, hit)));
+                    continue;
+                }
+                let (back, hit) = self.follow(&pushing, &start, &Vector3::new(0.0, -out * free, 0.0));
+                let ended = back.path.last().map_or(tip.y, |last| arm.world_from_tool(last).translation.y);
+                let is_out = tip.y - ended >= least - 1e-6;
+                let hit = hit.or_else(|| out_hit.clone());
+                let blocker = (!is_out).then(|| hit.map_or(Rejection::NoWay, |hit| blocked(Stage::WayIn, hit)));
+                goals.push(Attempt { push: line.path, chain: back.path, blocker });
+                // A way that leads straight out and on is as good as it gets; the planner need not search for others.
+                if is_out && let Some(motion) = self.finish(&space, &ready, &goals[goals.len() - 1..], STRAIGHT, rng) {
+                    return Ok(motion);
+                }
+            }
         }
+        goals.sort_by_key(|attempt| attempt.blocker.is_some());
+        for attempt in goals.into_iter().take(QUERIES) {
+            if let Some(motion) = self.finish(&space, &ready, &attempt.turned(arm), QUERY, rng) {
+                return Ok(motion);
+            }
+            reason.deeper(3, attempt.blocker.unwrap_or(Rejection::NoWay));
+        }
+        Err(reason.rejection)
+    }
+
+    /// What the gripper meets that it may not touch when it is moved along `travel`, and the share of the way until there.
+    fn gripper_hit(&self, from: &Frame, travel: &Vector3<f64>, target: &Patch) -> (f64, Option<Hit>) {
         let height = self.grid.dims[2];
-        let blocking: Vec<usize> =
-            swept.iter().filter(|&index| self.confident.contains(index) && !target.contains(index / height)).collect();
-        let first = *blocking.first()?;
-        let center = |index: usize| self.grid.center(self.grid.voxel(index));
-        let met = |pose: &Pose| blocking.iter().copied().find(|&index| self.touches_voxel(tool, pose, index));
-        if let Some(index) = met(&Tool::world_from_tool(push.start_point())) {
-            return Some(Rejection::StartBlocked { at: center(index).coords.into() });
+        let blocks = |index: usize| self.confident.contains(index) && !target.contains(index / height);
+        let steps = (travel.norm() / GRIPPER_STEP_M).ceil().max(1.0) as usize;
+        let first = usize::from(travel.norm() > 0.0);
+        for step in first..=steps {
+            let share = step as f64 / steps as f64;
+            let pose = Frame::from_parts(Translation3::from(from.translation.vector + travel * share), from.rotation);
+            if let Some(index) = self.tool.arm.gripper_touches(&pose, &self.confident_field, blocks) {
+                let at = self.grid.center(self.grid.voxel(index)).coords.into();
+                let link = self.tool.arm.gripper_name().to_owned();
+                return ((step - first) as f64 / steps as f64, Some(Hit { link, obstacle: Obstacle::Map { at } }));
+            }
+            if first == 0 {
+                break;
+            }
         }
-        let index = path.iter().find_map(met).unwrap_or(first);
-        Some(Rejection::PathBlocked { at: center(index).coords.into() })
+        (1.0, None)
     }
 
-    /// Whether a part of the tool that is inside the shelf reaches into board, walls or ceiling.
-    fn touches_shelf(&self, tool: &Tool, pose: &Pose) -> bool {
-        let (min, max) = (self.grid.min(), self.grid.max());
-        tool.parts.iter().map(|part| part.bounds_at(pose)).any(|part| {
-            let inside = part.max.y > min.y;
-            let fits = |axis: usize| part.min[axis] > min[axis] - TOUCH_M && part.max[axis] < max[axis] + TOUCH_M;
-            inside && !(fits(0) && fits(2) && part.max.y < max.y + TOUCH_M)
-        })
+    /// Follows a line as far as it is free; what stopped it, if something did.
+    fn follow(&self, space: &Space<'_>, start: &Joints, travel: &Vector3<f64>) -> (Follow, Option<Hit>) {
+        let mut hit = None;
+        let follow = follow_line(&self.tool.arm, start, travel, |joints| {
+            hit = space.hit(joints);
+            hit.is_none()
+        });
+        (follow, hit)
     }
 
-    /// Whether the tool at `pose` reaches into a voxel: the voxel's centre is inside a part grown by half a voxel.
-    fn touches_voxel(&self, tool: &Tool, pose: &Pose, index: usize) -> bool {
-        let half = 0.5 * self.grid.voxel_m;
-        let center = pose.inverse_transform_point(&self.grid.center(self.grid.voxel(index)));
-        tool.parts.iter().flat_map(|solid| &solid.parts).any(|part| {
-            part.planes.iter().all(|plane| {
-                let reach = half * (pose.rotation * plane.normal).abs().sum();
-                plane.normal.dot(&center.coords) < plane.offset + reach - TOUCH_M
-            })
-        })
+    /// A way from where the arm waits to the start of one of the attempts.
+    fn finish(
+        &self,
+        space: &Space<'_>,
+        ready: &Joints,
+        attempts: &[Attempt],
+        settings: PlanSettings,
+        rng: &mut ChaCha8Rng,
+    ) -> Option<PushMotion> {
+        let chains: Vec<Vec<Joints>> = attempts.iter().map(|attempt| attempt.chain.clone()).collect();
+        let planned = plan(space, ready, &chains, settings, rng)?;
+        let start = planned.path.last()?;
+        let attempt = attempts.iter().find(|attempt| attempt.push.first() == Some(start))?;
+        Some(PushMotion::new(&self.tool.arm, &planned.path, &attempt.push))
     }
+}
+
+/// A push that lacks its way in.
+struct Attempt {
+    /// Configurations along the push.
+    push: Vec<Joints>,
+    /// Configurations from the push's start straight out of the shelf, as far as they are free.
+    chain: Vec<Joints>,
+    /// What kept it from backing out all the way.
+    blocker: Option<Rejection>,
+}
+
+impl Attempt {
+    /// The same push, and the same with one joint turned by a whole turn.
+    fn turned(&self, arm: &Arm) -> Vec<Self> {
+        let whole: Vec<Joints> = self.chain.iter().chain(&self.push).copied().collect();
+        let split = |whole: Vec<Joints>| {
+            let (chain, push) = whole.split_at(self.chain.len());
+            Self { push: push.to_vec(), chain: chain.to_vec(), blocker: self.blocker.clone() }
+        };
+        turned(arm, &whole).into_iter().map(split).collect()
+    }
+}
+
+/// The reason of the attempt that came farthest.
+struct Reason {
+    depth: u8,
+    rejection: Rejection,
+}
+
+impl Reason {
+    fn deeper(&mut self, depth: u8, rejection: Rejection) {
+        if depth > self.depth {
+            *self = Self { depth, rejection };
+        }
+    }
+}
+
+fn blocked(stage: Stage, hit: Hit) -> Rejection {
+    Rejection::ArmBlocked { stage, hit }
 }

@@ -1,8 +1,8 @@
 use super::*;
-use crate::Point;
 use crate::belief::evidence;
 use crate::grid::Grid;
 use crate::rng::stream;
+use crate::{Point, Vector};
 
 /// A shelf believed free but for boxes `[x0, x1, y0, y1, height]` (metres), each with its class on its cells.
 fn believed(boxes: &[([f32; 5], u8)]) -> Belief {
@@ -26,12 +26,33 @@ fn voxel_at(belief: &Belief, x: f32, y: f32, z: f32) -> Voxel {
     belief.grid.voxel_at(Point::new(x, y, z)).expect("inside the grid")
 }
 
+fn arm() -> ArmTool {
+    ArmTool::standard(crate::scene::Shelf::new([0.80, 0.40, 0.40]))
+}
+
 /// What the checks say to a push towards the object whose front is at `front`.
 fn verdict(belief: &Belief, front: [f32; 3], direction_deg: f32, length_m: f32) -> Option<Rejection> {
-    let (tool, clearance) = (Tool::standard(), Clearance::new(belief));
+    let arm = arm();
+    let clearance = ArmClearance::new(&arm, belief);
     let frontier = voxel_at(belief, front[0], front[1], front[2]);
     let push = Push { start: start_of(belief, frontier), direction_deg, length_m };
-    clearance.check(&tool, &push, &tool.swept_volume(&push, &belief.grid), &clearance.target(frontier))
+    clearance.motion(&push, &clearance.target(frontier), &mut stream(1, "verdict", 0)).err()
+}
+
+/// Where on its way, and which voxel of the map, a blocked push meets.
+fn met(rejection: Option<Rejection>) -> (Stage, [f32; 3]) {
+    match rejection {
+        Some(Rejection::ArmBlocked { stage, hit: Hit { obstacle: Obstacle::Map { at }, .. } }) => (stage, at),
+        other => panic!("not blocked by the map: {other:?}"),
+    }
+}
+
+/// Which panel of the shelf a blocked push meets.
+fn panel(rejection: Option<Rejection>) -> String {
+    match rejection {
+        Some(Rejection::ArmBlocked { hit: Hit { obstacle: Obstacle::Shelf { panel }, .. }, .. }) => panel.to_string(),
+        other => panic!("not blocked by the shelf: {other:?}"),
+    }
 }
 
 const TALL: f32 = 0.20;
@@ -74,48 +95,48 @@ fn a_lone_box_can_be_pushed() {
 }
 
 #[test]
-fn a_box_in_the_way_in_blocks_the_path_where_the_tip_meets_it() {
-    let belief = believed(&[([-0.04, 0.04, 0.30, 0.35, TALL], 3), ([-0.01, 0.01, 0.10, 0.15, 0.065], 6)]);
-    // At the start the links stand where the box is, so the start pose itself is blocked.
-    let Some(Rejection::StartBlocked { at }) = verdict(&belief, [0.0, 0.30, 0.06], 90.0, 0.05) else {
-        panic!("not blocked at the start");
+fn a_wall_before_the_target_blocks_the_start_and_a_gap_in_it_lets_the_arm_through() {
+    let walled = |gap: f32| {
+        let part = |x0: f32, x1: f32| ([x0, x1, 0.10, 0.15, TALL], 6);
+        believed(&[([-0.04, 0.04, 0.30, 0.35, TALL], 3), part(-0.38, -gap), part(gap, 0.38)])
     };
-    assert!(at[0].abs() < 0.01 && (0.10..0.15).contains(&at[1]) && at[2] < 0.065, "{at:?}");
-    // A box lower than the tool is passed over.
-    let low = believed(&[([-0.04, 0.04, 0.30, 0.35, TALL], 3), ([-0.01, 0.01, 0.10, 0.15, 0.02], 6)]);
-    assert_eq!(verdict(&low, [0.0, 0.30, 0.06], 90.0, 0.05), None);
+    // At the start the gripper stands where the wall is.
+    let (stage, at) = met(verdict(&walled(0.0), [0.0, 0.30, 0.06], 90.0, 0.05));
+    assert_eq!(stage, Stage::Start);
+    assert!((0.10..0.15).contains(&at[1]) && at[2] < TALL, "{at:?}");
+    assert_eq!(verdict(&walled(0.20), [0.0, 0.30, 0.06], 90.0, 0.05), None);
 }
 
 #[test]
-fn a_box_beside_a_sideways_push_blocks_the_path() {
-    let boxes = [([-0.04, 0.00, 0.20, 0.25, TALL], 3), ([0.09, 0.12, 0.05, 0.10, TALL], 6)];
+fn a_box_beside_a_sideways_push_blocks_its_path() {
+    let boxes = [([-0.04, 0.00, 0.20, 0.25, TALL], 3), ([0.09, 0.16, 0.02, 0.17, TALL], 6)];
     let belief = believed(&boxes);
     assert_eq!(verdict(&belief, [-0.02, 0.20, 0.06], 90.0, 0.10), None, "straight in there is room");
-    let Some(Rejection::PathBlocked { at }) = verdict(&belief, [-0.02, 0.20, 0.06], 0.0, 0.12) else {
-        panic!("not blocked along the push");
-    };
-    assert!((0.09..0.12).contains(&at[0]) && (0.05..0.10).contains(&at[1]), "{at:?}");
-    assert_eq!(verdict(&belief, [-0.02, 0.20, 0.06], 0.0, 0.05), None, "a shorter push stays clear of it");
+    let (stage, at) = met(verdict(&belief, [-0.02, 0.20, 0.06], 0.0, 0.14));
+    assert_eq!(stage, Stage::Push);
+    assert!((0.09..0.16).contains(&at[0]) && (0.02..0.17).contains(&at[1]), "{at:?}");
+    assert_eq!(verdict(&belief, [-0.02, 0.20, 0.06], 0.0, 0.03), None, "a shorter push stays clear of it");
 }
 
 #[test]
 fn another_class_behind_the_target_blocks_and_its_own_class_does_not() {
     let touching = |class| believed(&[([-0.04, 0.04, 0.20, 0.24, TALL], 3), ([-0.04, 0.04, 0.24, 0.30, TALL], class)]);
     assert_eq!(verdict(&touching(3), [0.0, 0.20, 0.06], 90.0, 0.10), None);
-    let blocked = verdict(&touching(5), [0.0, 0.20, 0.06], 90.0, 0.10);
-    assert!(matches!(blocked, Some(Rejection::PathBlocked { at }) if at[1] >= 0.24), "{blocked:?}");
+    let (stage, at) = met(verdict(&touching(5), [0.0, 0.20, 0.06], 90.0, 0.10));
+    assert!(stage == Stage::Push && at[1] >= 0.24, "{stage:?} {at:?}");
     assert_eq!(verdict(&touching(5), [0.0, 0.20, 0.06], 90.0, 0.05), None, "before the tip gets there");
 }
 
 #[test]
-fn walls_and_back_are_the_shelf() {
+fn walls_are_the_shelf_and_the_back_is_out_of_reach() {
     let near_wall = believed(&[([0.36, 0.39, 0.20, 0.25, TALL], 3)]);
-    assert_eq!(verdict(&near_wall, [0.375, 0.20, 0.06], 90.0, 0.05), Some(Rejection::Shelf));
-    let near_back = believed(&[([-0.02, 0.02, 0.30, 0.39, TALL], 3)]);
-    assert_eq!(verdict(&near_back, [0.0, 0.30, 0.06], 90.0, 0.15), Some(Rejection::Shelf));
-    assert_eq!(verdict(&near_back, [0.0, 0.30, 0.06], 90.0, 0.10), None);
+    assert_eq!(panel(verdict(&near_wall, [0.385, 0.20, 0.06], 90.0, 0.05)), "right wall");
     let towards_wall = believed(&[([0.30, 0.33, 0.20, 0.25, TALL], 3)]);
-    assert_eq!(verdict(&towards_wall, [0.31, 0.20, 0.06], 0.0, 0.10), Some(Rejection::Shelf));
+    assert_eq!(panel(verdict(&towards_wall, [0.31, 0.20, 0.06], 0.0, 0.10)), "right wall");
+    let near_back = believed(&[([-0.02, 0.02, 0.30, 0.39, TALL], 3)]);
+    let too_far = Some(Rejection::Unreachable { stage: Stage::Push });
+    assert_eq!(verdict(&near_back, [0.0, 0.30, 0.06], 90.0, 0.15), too_far);
+    assert_eq!(verdict(&near_back, [0.0, 0.30, 0.06], 90.0, 0.05), None);
 }
 
 #[test]
@@ -125,8 +146,8 @@ fn samples_are_what_the_method_says() {
         ([-0.02, 0.05, 0.22, 0.26, 0.12], 5),
         ([0.20, 0.26, 0.10, 0.16, TALL], 7),
     ]);
-    let tool = Tool::standard();
-    let candidates = sample(&belief, &tool, 30, &mut stream(1, "pushes", 4));
+    let arm = arm();
+    let candidates = sample(&belief, &arm, 30, &mut stream(1, "pushes", 4));
     assert_eq!(candidates.iter().filter(|c| c.rejection.is_none()).count(), 30);
     assert!(candidates.last().is_some_and(|c| c.rejection.is_none()), "drawing ends with the last one wanted");
     for candidate in &candidates {
@@ -134,7 +155,20 @@ fn samples_are_what_the_method_says() {
         assert!((0.0..=180.0).contains(&push.direction_deg), "{push:?}");
         assert!((LENGTH_M[0]..LENGTH_M[1]).contains(&push.length_m), "{push:?}");
         assert_eq!(push.start, [point.x, point.y - STANDOFF_M, TOOL_HEIGHT_M]);
-        assert_eq!(candidate.swept.swept, tool.swept_volume(push, &belief.grid));
+        let swept = &candidate.swept.swept;
+        match &candidate.motion {
+            Some(motion) => {
+                let ready = arm.ready.expect("it waits somewhere");
+                assert!(candidate.rejection.is_none() && motion.carries_out(&arm.arm, &ready, push));
+                assert_eq!(*swept, motion.swept_volume(&arm.arm, &belief.grid));
+            }
+            None => assert!(candidate.rejection.is_some()),
+        }
+        // The tip is in what is swept, from start to end.
+        for at in [push.start_point(), push.end_point()] {
+            let inside = belief.grid.voxel_at(at - Vector::y() * 0.004);
+            assert!(inside.is_none_or(|voxel| swept.contains(belief.grid.index(voxel))), "{push:?}");
+        }
     }
     assert!(!candidates.is_sorted_by_key(|c| (c.frontier.x, c.frontier.z)), "drawn at random, not in order");
     for (i, a) in candidates.iter().enumerate() {
@@ -145,10 +179,10 @@ fn samples_are_what_the_method_says() {
 #[test]
 fn sampling_does_not_depend_on_the_number_of_threads_but_on_the_stream() {
     let belief = believed(&[([-0.25, -0.10, 0.15, 0.20, TALL], 3), ([0.0, 0.09, 0.22, 0.26, 0.12], 5)]);
-    let tool = Tool::standard();
+    let arm = arm();
     let on = |threads: usize, seed: u64| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let drawn = pool.install(|| sample(&belief, &tool, 20, &mut stream(seed, "pushes", 0)));
+        let drawn = pool.install(|| sample(&belief, &arm, 20, &mut stream(seed, "pushes", 0)));
         drawn.into_iter().map(|c| (c.frontier, c.swept.push, c.rejection)).collect::<Vec<_>>()
     };
     assert_eq!(on(1, 3), on(4, 3));
@@ -158,11 +192,11 @@ fn sampling_does_not_depend_on_the_number_of_threads_but_on_the_stream() {
 #[test]
 fn a_lone_voxel_is_no_target_and_an_empty_shelf_gives_no_candidate() {
     let mut belief = believed(&[]);
-    let tool = Tool::standard();
-    assert!(sample(&belief, &tool, 10, &mut stream(1, "pushes", 0)).is_empty());
+    let arm = arm();
+    assert!(sample(&belief, &arm, 10, &mut stream(1, "pushes", 0)).is_empty());
     let index = belief.grid.index(voxel_at(&belief, 0.0, 0.2, 0.1));
     belief.occupancy[index] = evidence(3.0, 30.0);
-    let candidates = sample(&belief, &tool, 10, &mut stream(1, "pushes", 0));
+    let candidates = sample(&belief, &arm, 10, &mut stream(1, "pushes", 0));
     assert_eq!(candidates.len(), 1);
     assert_eq!(candidates[0].rejection, Some(Rejection::NoTarget));
 }
@@ -170,14 +204,14 @@ fn a_lone_voxel_is_no_target_and_an_empty_shelf_gives_no_candidate() {
 #[test]
 fn a_shelf_that_is_full_gives_up_after_its_draws() {
     let belief = believed(&[([-0.4, 0.4, 0.0, 0.4, TALL], 3)]);
-    let candidates = sample(&belief, &Tool::standard(), 4, &mut stream(1, "pushes", 0));
+    let candidates = sample(&belief, &arm(), 4, &mut stream(1, "pushes", 0));
     assert!(candidates.len() <= 4 * DRAWS_PER_CANDIDATE);
 }
 
 #[test]
 fn rejections_read_as_they_are_filed() {
-    let json = serde_json::to_string(&Rejection::PathBlocked { at: [0.5, 0.25, 0.125] }).expect("json");
-    assert_eq!(json, r#"{"kind":"path_blocked","at":[0.5,0.25,0.125]}"#);
+    let json = serde_json::to_string(&Rejection::Unreachable { stage: Stage::WayIn }).expect("json");
+    assert_eq!(json, r#"{"kind":"unreachable","stage":"way_in"}"#);
 }
 
 #[test]

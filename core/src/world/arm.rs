@@ -28,7 +28,7 @@ impl World {
     ///
     /// An arm that is blocked stops there, goes back and reports a stall. It is planned clear of the shelf and does not
     /// feel it; how deep it got into a panel is in the outcome all the same.
-    pub fn execute_motion(&mut self, arm: &Arm, motion: &PushMotion) -> PushOutcome {
+    pub fn execute(&mut self, arm: &Arm, motion: &PushMotion) -> PushOutcome {
         let before = self.poses();
         let dropped_before = self.dropped.clone();
         self.physics.begin();

@@ -1,4 +1,4 @@
-//! The boundary to rapier3d: colliders, time steps, the kinematic tool, and what can be read back.
+//! The boundary to rapier3d: colliders, time steps, the kinematic arm, and what can be read back.
 //!
 //! Lengths here are tenths of metres and less, so rapier's `length_unit` is 0.1: contact margins, correction speeds
 //! and sleeping thresholds scale with it, and objects that are squeezed come apart at 0.3 m/s and do not explode.
@@ -7,8 +7,7 @@ use super::hull::Hull;
 use super::shelf_panels;
 use crate::arm::{Arm, Joints, Role, pose_of};
 use crate::scene::{Body, Shelf};
-use crate::solid::{ConvexPart, Solid};
-use crate::tool::Tool;
+use crate::solid::ConvexPart;
 use crate::{Point, Pose, Vector};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 use rapier3d::math::{Pose as RapierPose, Rotation as RapierRotation, Vector as RapierVector};
@@ -24,10 +23,10 @@ use rapier3d::prelude::{
 pub(super) const TIME_STEP_S: f32 = 1.0 / 240.0;
 /// How far below the board a centre of mass must be for the body to be taken away, metres.
 pub(super) const FALL_M: f32 = 0.10;
-/// Force on the tool, newtons, from which it counts as blocked: what pushes a shelf full of objects along the board is
+/// Force on the arm, newtons, from which it counts as blocked: what pushes a shelf full of objects along the board is
 /// about half of it, what jams them against a wall far more.
 pub(super) const BLOCKING_FORCE_N: f32 = 60.0;
-/// Successive steps with that force until the tool gives up; a single hit is no blockade.
+/// Successive steps with that force until the arm gives up; a single hit is no blockade.
 const BLOCKED_STEPS: u32 = 8;
 /// Friction of shelf and tool; a contact has the mean of both sides.
 const SHELF_FRICTION: f32 = 0.5;
@@ -57,7 +56,6 @@ struct ArmBody {
 pub(super) struct Physics {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
-    tool: Option<RigidBodyHandle>,
     /// The arm's bodies while it moves.
     arm: Vec<ArmBody>,
     /// Board first, then back, left, right, ceiling.
@@ -87,7 +85,6 @@ impl Clone for Physics {
                 soft_bodies: world.soft_bodies.clone(),
             },
             handles: self.handles.clone(),
-            tool: self.tool,
             arm: self.arm.clone(),
             panels: self.panels.clone(),
             blocked_steps: self.blocked_steps,
@@ -117,7 +114,7 @@ impl Physics {
             panels.push(world.insert_collider(collider, None));
         }
         let handles = bodies.iter().map(|body| insert_body(&mut world, body)).collect();
-        Self { world, handles, tool: None, arm: Vec::new(), panels, blocked_steps: 0, steps: 0 }
+        Self { world, handles, arm: Vec::new(), panels, blocked_steps: 0, steps: 0 }
     }
 
     /// Starts an action. Workspaces are renewed, so that a clone, which cannot copy them, starts from the same state.
@@ -173,35 +170,6 @@ impl Physics {
     }
 
     /// Puts the tool with its tip at `tip`.
-    pub(super) fn insert_tool(&mut self, tool: &Tool, tip: Point) {
-        let pose = to_rapier_pose(&Tool::world_from_tool(tip));
-        let handle = self.world.insert_body(RigidBodyBuilder::kinematic_position_based().pose(pose));
-        for part in tool.parts.iter().flat_map(|solid: &Solid| &solid.parts) {
-            if let Some(shape) = shape_of(part) {
-                let collider =
-                    ColliderBuilder::new(shape).friction(TOOL_FRICTION).collision_groups(groups(TOOL, OBJECT));
-                self.world.insert_collider(collider, Some(handle));
-            }
-        }
-        self.tool = Some(handle);
-    }
-
-    pub(super) fn remove_tool(&mut self) {
-        if let Some(handle) = self.tool.take() {
-            self.world.remove_body(handle);
-        }
-    }
-
-    /// One time step in which the tool's tip goes to `tip`; returns whether the tool has been blocked for a while.
-    pub(super) fn step_tool(&mut self, tip: Point) -> bool {
-        let Some(handle) = self.tool else { return false };
-        if let Some(body) = self.world.bodies.get_mut(handle) {
-            body.set_next_kinematic_position(to_rapier_pose(&Tool::world_from_tool(tip)));
-        }
-        self.step();
-        self.note_force(self.tool_force_n())
-    }
-
     /// Whether what pushes has met more than [`BLOCKING_FORCE_N`] for a while, the last step included.
     fn note_force(&mut self, force_n: f32) -> bool {
         let blocked = force_n > BLOCKING_FORCE_N;
@@ -211,13 +179,6 @@ impl Physics {
             return true;
         }
         false
-    }
-
-    /// Sum of the contact forces that objects had on the tool in the last step, newtons.
-    pub(super) fn tool_force_n(&self) -> f32 {
-        let Some(body) = self.tool.and_then(|handle| self.world.bodies.get(handle)) else { return 0.0 };
-        let pairs = body.colliders().iter().flat_map(|&c| self.world.narrow_phase.contact_pairs_with(c));
-        pairs.map(|pair| pair.total_impulse_magnitude()).sum::<f32>() / TIME_STEP_S
     }
 
     /// Puts the arm's links where `joints` has them. The base touches nothing and is left out.

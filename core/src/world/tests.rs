@@ -1,8 +1,26 @@
 use super::*;
+use crate::Vector;
+use crate::arm::ArmTool;
+use crate::arm::Push;
+use crate::belief::Belief;
+use crate::push::ArmClearance;
+use crate::rng::stream;
 use crate::scene::ClassId;
 use crate::solid::{ConvexPart, Solid};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::sync::Arc;
+
+/// Carries a push out by the standard arm, by its motion in a shelf of which nothing is known.
+fn push_in(world: &mut World, arm: &ArmTool, push: &Push) -> PushOutcome {
+    let belief = Belief::uniform(shelf().grid());
+    let clearance = ArmClearance::new(arm, &belief);
+    let motion = clearance.motion(push, &clearance.target_of(push), &mut stream(1, "test pushes", 0));
+    world.execute(&arm.arm, &motion.expect("within reach"))
+}
+
+fn arm() -> ArmTool {
+    ArmTool::standard(shelf())
+}
 
 fn shelf() -> Shelf {
     Shelf::new([0.80, 0.40, 0.40])
@@ -76,21 +94,23 @@ fn a_push_moves_what_it_meets_and_nothing_else() {
     let before = poses(&world)[1];
     // The tip touches the block after 2 cm and carries it 8 cm on.
     let push = Push { start: [0.0, 0.10, 0.06], direction_deg: 90.0, length_m: 0.10 };
-    let outcome = world.execute(&Tool::standard(), &push);
+    let outcome = push_in(&mut world, &arm(), &push);
     assert!((outcome.displacement_m[0] - 0.08).abs() < 0.006, "{:?}", outcome);
     assert!((world.bodies()[0].world_from_body.translation.y - 0.23).abs() < 0.006);
     assert_eq!((outcome.displacement_m[1], poses(&world)[1]), (0.0, before));
     assert!(!outcome.stalled && (outcome.pushed_m - 0.10).abs() < 1e-6 && outcome.dropped.is_empty());
-    // In 0.12 m at 0.25 m/s, along 0.1 m at 0.1 m/s, back 0.22 m at 0.5 m/s, and a rest.
-    assert!(outcome.duration_s > 1.9 && outcome.duration_s < 2.9, "{}", outcome.duration_s);
+    // Along 0.1 m at 0.1 m/s at least, and a rest.
+    assert!(outcome.arm_s > 1.0 && outcome.duration_s >= outcome.arm_s, "{outcome:?}");
+    assert!(outcome.link_contacts.is_empty() && outcome.arm_in_shelf_m < 0.002, "{outcome:?}");
 }
 
 #[test]
 fn snapshots_and_fresh_worlds_have_the_same_future() {
-    let tool = Tool::standard();
+    let arm = arm();
     let run = |mut world: World| {
-        let first = world.execute(&tool, &into_the_crowd());
-        let second = world.execute(&tool, &Push { start: [-0.15, 0.05, 0.06], direction_deg: 60.0, length_m: 0.1 });
+        let first = push_in(&mut world, &arm, &into_the_crowd());
+        let second =
+            push_in(&mut world, &arm, &Push { start: [-0.15, 0.05, 0.06], direction_deg: 60.0, length_m: 0.1 });
         (poses(&world), first, second)
     };
     let mut world = World::new(shelf(), crowd());
@@ -104,9 +124,9 @@ fn snapshots_and_fresh_worlds_have_the_same_future() {
     assert_eq!(run(fresh), expected);
     // A snapshot between two pushes, and one on another thread.
     let mut branch = snapshot.clone();
-    branch.execute(&tool, &into_the_crowd());
+    push_in(&mut branch, &arm, &into_the_crowd());
     let mut branch = branch.clone();
-    branch.execute(&tool, &Push { start: [-0.15, 0.05, 0.06], direction_deg: 60.0, length_m: 0.1 });
+    push_in(&mut branch, &arm, &Push { start: [-0.15, 0.05, 0.06], direction_deg: 60.0, length_m: 0.1 });
     assert_eq!(poses(&branch), expected.0);
     let elsewhere = std::thread::scope(|scope| scope.spawn(|| run(snapshot)).join().expect("joins"));
     assert_eq!(elsewhere, expected);
@@ -115,18 +135,18 @@ fn snapshots_and_fresh_worlds_have_the_same_future() {
 #[test]
 fn an_object_pushed_over_the_edge_is_dropped() {
     let block = Solid::standing_box(Vector::new(0.06, 0.06, 0.12));
-    let mut world = World::new(shelf(), vec![body(5, block.clone(), -0.08, 0.04, 0.0), body(6, block, 0.2, 0.2, 0.0)]);
+    let mut world = World::new(shelf(), vec![body(5, block.clone(), -0.08, 0.02, 0.0), body(6, block, 0.2, 0.2, 0.0)]);
     world.settle();
-    // A small finger goes in beside the block and comes back towards the front edge behind it.
-    let finger = Tool { parts: vec![Solid::standing_box(Vector::new(0.01, 0.01, 0.02))] };
-    let push = Push { start: [-0.04, 0.12, 0.03], direction_deg: 250.0, length_m: 0.15 };
-    let outcome = world.execute(&finger, &push);
+    // The gripper goes in beside the block and takes it along, sideways and towards the front.
+    let arm = arm();
+    let push = Push { start: [0.02, 0.10, 0.06], direction_deg: 203.0, length_m: 0.15 };
+    let outcome = push_in(&mut world, &arm, &push);
     assert_eq!(outcome.dropped, vec![ObjectId(5)]);
     assert_eq!(world.bodies().iter().map(|body| body.id).collect::<Vec<_>>(), vec![ObjectId(6)]);
     // To where it was found below the board, not to where it would be after seconds of falling.
     assert!((0.05..0.4).contains(&outcome.displacement_m[0]) && outcome.displacement_m[1] == 0.0, "{outcome:?}");
     // Once dropped, it is not dropped again.
-    let again = world.execute(&finger, &push);
+    let again = push_in(&mut world, &arm, &push);
     assert!(again.dropped.is_empty() && again.displacement_m == vec![0.0, 0.0]);
 }
 
@@ -138,7 +158,7 @@ fn a_jammed_tool_stalls_and_nothing_explodes() {
     let mut world = World::new(shelf(), row.collect());
     world.settle();
     let push = Push { start: [0.0, 0.0, 0.06], direction_deg: 90.0, length_m: 0.12 };
-    let outcome = world.execute(&Tool::standard(), &push);
+    let outcome = push_in(&mut world, &arm(), &push);
     assert!(outcome.stalled, "{outcome:?}");
     // 1 cm to the first box, then the play of 2 x 3 mm and 2.4 cm to the wall.
     assert!(outcome.pushed_m > 0.02 && outcome.pushed_m < 0.06, "{outcome:?}");
@@ -153,7 +173,7 @@ fn a_jammed_tool_stalls_and_nothing_explodes() {
 
 #[test]
 fn pushes_into_a_crowd_stay_sane() {
-    let tool = Tool::standard();
+    let arm = arm();
     for i in 0..12 {
         let mut world = World::new(shelf(), crowd());
         world.settle();
@@ -162,7 +182,7 @@ fn pushes_into_a_crowd_stay_sane() {
             direction_deg: 40.0 + 10.0 * i as f32,
             length_m: 0.15,
         };
-        let outcome = world.execute(&tool, &push);
+        let outcome = push_in(&mut world, &arm, &push);
         assert!(world.deepest_overlap_m() < 0.002, "push {i}: {}", world.deepest_overlap_m());
         assert!(world.kinetic_energy_j() < 1e-6);
         for (at, moved) in outcome.displacement_m.iter().enumerate() {

@@ -6,6 +6,7 @@ use crate::workbench::dialog::{Dialog, Reply};
 use crate::workbench::model::{GainSource, LayoutKind, Preview};
 use crate::workbench::session::{Activity, Session, SessionId};
 use crate::workbench::worker::{Begin, Order, Worker};
+use nudge_core::arm::Push;
 use nudge_core::belief::SweptPush;
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
@@ -14,7 +15,6 @@ use nudge_core::plan::{Action, Decision, PolicyKind, Reason};
 use nudge_core::push::swept_by;
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
-use nudge_core::tool::Push;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -366,7 +366,7 @@ impl App {
         let (of, setup) = ((session.id, moment.step), session.setup.clone());
         self.background.preview.ask(move |_| {
             let belief = moment.belief.belief();
-            let swept = swept_by(&setup.pusher, &belief, &push);
+            let swept = swept_by(&setup.arm, &belief, &push);
             let swept = SweptPush { push, swept };
             let prediction = setup.update.predict_pushes(&belief, std::slice::from_ref(&swept)).pop()?;
             Some(Preview { of, push, prediction: Arc::new(prediction), swept: Arc::new(swept.swept) })

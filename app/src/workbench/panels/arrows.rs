@@ -2,8 +2,8 @@
 
 use super::floor::Frame;
 use super::legend;
+use nudge_core::arm::Push;
 use nudge_core::plan::CandidateRecord;
-use nudge_core::tool::Push;
 use rerun::external::egui::{self, Color32, Painter, Pos2, Shape, Stroke, Ui, Vec2};
 
 /// How near the pointer has to be to an arrow, points.

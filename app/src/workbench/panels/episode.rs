@@ -4,7 +4,7 @@ use crate::driver::{BELIEFS, belief_update};
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session};
-use nudge_core::plan::{PlannerSettings, PolicyKind, PushedBy};
+use nudge_core::plan::{PlannerSettings, PolicyKind};
 use rerun::external::egui;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -184,18 +184,6 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
         ui.add(egui::DragValue::new(&mut form.seed))
             .labelled_by(label.id)
             .on_hover_text("Seed of every random choice, any whole number from 0");
-        ui.end_row();
-        let label = ui.label("pushes by");
-        egui::ComboBox::from_id_salt("pushes by")
-            .selected_text(form.planner.pushed_by.to_string())
-            .show_ui(ui, |ui| {
-                for by in PushedBy::ALL {
-                    ui.selectable_value(&mut form.planner.pushed_by, by, by.to_string());
-                }
-            })
-            .response
-            .labelled_by(label.id)
-            .on_hover_text("What pushes: a tool that needs no arm, or the scene's arm, which also limits the views");
         ui.end_row();
         let label = ui.label("candidates");
         ui.add(egui::DragValue::new(&mut form.planner.candidates).range(0..=1000))

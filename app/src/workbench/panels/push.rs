@@ -17,10 +17,10 @@ use crate::workbench::command::Command;
 use crate::workbench::derive::{Derived, MapKind};
 use crate::workbench::model::{Hovered, Model, Picked, Preview};
 use crate::workbench::session::{Session, SessionId};
+use nudge_core::arm::Push;
 use nudge_core::belief::PushPrediction;
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, CandidateRecord, Decision};
-use nudge_core::tool::Push;
 use rerun::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
 use std::sync::Arc;
 

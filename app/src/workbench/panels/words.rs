@@ -77,9 +77,6 @@ pub fn rejection(rejection: &Rejection) -> String {
     let place = |at: &[f32; 3]| format!("x {}, y {}, z {} m", metres(at[0]), metres(at[1]), metres(at[2]));
     match rejection {
         Rejection::NoTarget => "nothing likely within reach to push at".to_owned(),
-        Rejection::StartBlocked { at } => format!("the tool would start in something at {}", place(at)),
-        Rejection::PathBlocked { at } => format!("something is in the way at {}", place(at)),
-        Rejection::Shelf => "the tool would touch the shelf".to_owned(),
         arm @ (Rejection::Unreachable { .. } | Rejection::ArmBlocked { .. } | Rejection::NoWay) => arm.to_string(),
     }
 }

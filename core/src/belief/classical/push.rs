@@ -225,10 +225,10 @@ impl Track {
 mod tests {
     use super::super::Classical;
     use super::*;
+    use crate::arm::Push;
     use crate::belief::BeliefUpdate;
     use crate::grid::{Grid, VoxelSet};
     use crate::scene::ClassId;
-    use crate::tool::Push;
 
     /// A shelf with a box of class 5 on it, `x` in +-5 cm, `y` in 20 to 28 cm, `z` below 10 cm, and one of class 7 to the
     /// right of where that is going, `x` in 8 to 12 cm, `y` in 22 to 26 cm; everything else known free. The tool passes

@@ -15,6 +15,7 @@ use crate::rng::stream;
 use crate::scene::CLASS_COUNT;
 use crate::{Error, Result};
 use rand::Rng;
+use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 use tch::nn::VarStore;
@@ -22,6 +23,8 @@ use tch::{Device, Kind, Tensor};
 
 /// Sub-cells of a pixel.
 const SUBS: usize = 4;
+/// Memory for beliefs that are kept, bytes.
+const BELIEFS_BYTES: usize = 6 << 30;
 /// Weight of the consistency term.
 const CONSISTENCY: f64 = 0.01;
 
@@ -44,6 +47,8 @@ pub struct PushTrainer {
     net: PushNet,
     store: VarStore,
     state: State,
+    /// What sigma_o makes of the samples seen so far.
+    beliefs: Beliefs,
 }
 
 impl PushTrainer {
@@ -60,7 +65,7 @@ impl PushTrainer {
         let store = VarStore::new(device);
         let net = PushNet::new(&store.root(), PushConfig { width: settings.width });
         let state = State::new(&store);
-        Ok(Self { settings, layout, net, store, state })
+        Ok(Self { settings, layout, net, store, state, beliefs: Beliefs::default() })
     }
 
     /// Goes on with the run named `out`.
@@ -137,7 +142,10 @@ impl PushTrainer {
             let (at, mirrored) = (rng.random_range(0..data.len()), rng.random());
             let sample = data.get(at)?;
             if !sample.pushes.is_empty() {
-                scenes.push(Scene::new(&self.layout, sample, if mirrored { Mirror::X } else { Mirror::No }, observe));
+                let evidence = self.beliefs.of(&self.layout, at, &sample, observe);
+                let (mirror, evidence) =
+                    if mirrored { (Mirror::X, evidence.mirrored()) } else { (Mirror::No, evidence) };
+                scenes.push(Scene::new(&self.layout, &sample, mirror, evidence));
             }
         }
         let device = self.store.device();
@@ -198,6 +206,35 @@ impl PushTrainer {
     }
 }
 
+/// What the frozen sigma_o makes of samples: as long as training lasts it stays the same, and takes most of an update's
+/// time. Kept with 16 bits up to [`BELIEFS_BYTES`]; what does not fit is made again.
+#[derive(Debug, Default)]
+struct Beliefs {
+    kept: HashMap<usize, Evidence>,
+    bytes: usize,
+}
+
+impl Beliefs {
+    /// The belief after the views of sample `number`, not mirrored.
+    fn of(&mut self, layout: &Layout, number: usize, sample: &PushSample, observe: &Cnabu) -> Evidence {
+        if let Some(kept) = self.kept.get(&number) {
+            return kept.to_kind(Kind::Float);
+        }
+        let mut evidence = Evidence::uniform(1, layout.pixels().map(|n| n as i64), observe.device());
+        for view in &sample.views {
+            let (observed, labels) = observation_planes(layout, &view.observation, Mirror::No);
+            evidence = observe.observe_planes(&evidence, &observed, &labels);
+        }
+        let half = evidence.to_kind(Kind::Half);
+        let bytes = 2 * (half.occupancy.numel() + half.semantics.numel());
+        if self.bytes + bytes <= BELIEFS_BYTES {
+            self.bytes += bytes;
+            self.kept.insert(number, half);
+        }
+        evidence
+    }
+}
+
 /// What a batch is to come to, in windows.
 struct Targets {
     truth: Tensor,
@@ -217,13 +254,8 @@ struct Scene {
 }
 
 impl Scene {
-    fn new(layout: &Layout, sample: PushSample, mirror: Mirror, observe: &Cnabu) -> Self {
-        let [x, y] = layout.pixels().map(|n| n as i64);
-        let mut evidence = Evidence::uniform(1, [x, y], observe.device());
-        for view in &sample.views {
-            let (observed, labels) = observation_planes(layout, &view.observation, mirror);
-            evidence = observe.observe_planes(&evidence, &observed, &labels);
-        }
+    fn new(layout: &Layout, sample: &PushSample, mirror: Mirror, evidence: Evidence) -> Self {
+        let y = layout.pixels()[1] as i64;
         let around = |pushed: &PushedSample| {
             let x = layout.around(&pushed.push.push, WINDOW);
             if mirror == Mirror::X { layout.mirrored(&x) } else { x }

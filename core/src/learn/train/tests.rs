@@ -9,7 +9,7 @@ fn recipe() -> Recipe {
     Recipe {
         catalog: Catalog::standard(),
         scenes: GenerateConfig::default(),
-        pusher: crate::arm::Pusher::default(),
+        arm: std::sync::Arc::new(crate::arm::ArmTool::standard(GenerateConfig::default().shelf)),
         views: ViewArray::named("standard300").expect("shipped"),
         noise_share: 0.0,
     }

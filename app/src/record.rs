@@ -29,8 +29,8 @@ use nudge_core::belief::{Belief, PushPrediction};
 use nudge_core::camera::{Image, View, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
 use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
-use nudge_core::grid::Grid;
-use nudge_core::plan::Action;
+use nudge_core::grid::{Grid, VoxelSet};
+use nudge_core::plan::{Action, gain_field};
 use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
@@ -70,6 +70,8 @@ pub struct State<'a> {
     pub bodies: &'a [Body],
     /// What is believed.
     pub belief: &'a Belief,
+    /// Voxels that do not count as a gain any more, if some do not.
+    pub seen: Option<&'a VoxelSet>,
     /// What is.
     pub truth: &'a TruthMap,
     /// How they compare.
@@ -156,7 +158,7 @@ impl Recorder {
                 self.note(line, rerun::TextLogLevel::INFO)?;
             }
         }
-        self.field = Some(GainField::new(state.belief));
+        self.field = Some(gain_field(state.belief, state.seen));
         self.flush()
     }
 
@@ -436,6 +438,7 @@ fn state<'a>(episode: &'a Episode, bodies: &'a [Body]) -> State<'a> {
         step: record.steps.len(),
         bodies,
         belief: episode.belief(),
+        seen: episode.seen(),
         truth: episode.truth(),
         scores: record.steps.last().map_or(&record.prior, |step| &step.scores),
     }

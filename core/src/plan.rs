@@ -17,6 +17,8 @@ use crate::arm::Push;
 use crate::arm::{ArmTool, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CERTAIN, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
+use crate::gain::GainField;
+use crate::grid::VoxelSet;
 use crate::push::Rejection;
 use serde::{Deserialize, Serialize};
 
@@ -179,6 +181,8 @@ pub struct Situation<'a> {
     pub unreachable: &'a [ViewId],
     /// What happened so far.
     pub history: &'a History,
+    /// Voxels that do not count as a gain, for [`Counted::Unseen`].
+    pub seen: Option<&'a VoxelSet>,
     /// Number of actions in all.
     pub budget: usize,
     /// Seed of the episode.
@@ -194,10 +198,54 @@ impl Situation<'_> {
     }
 }
 
+/// Which voxels a view's gain counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Counted {
+    /// All that the view may see, as in the paper.
+    All,
+    /// Those that no look has seen yet, or not since a push may have changed them.
+    #[default]
+    Unseen,
+}
+
+impl Counted {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::All, Self::Unseen];
+}
+
+impl std::fmt::Display for Counted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::All => "all",
+            Self::Unseen => "unseen",
+        })
+    }
+}
+
+impl std::str::FromStr for Counted {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL
+            .into_iter()
+            .find(|counted| counted.to_string() == text)
+            .ok_or_else(|| "there are all and unseen".to_owned())
+    }
+}
+
+/// What rays walk through to tell what views gain under a belief: voxels of `seen` block but do not count.
+pub fn gain_field(belief: &Belief, seen: Option<&VoxelSet>) -> GainField {
+    let field = GainField::new(belief);
+    seen.map(|seen| field.with_seen(seen)).unwrap_or(field)
+}
+
 /// Numbers of the planner that a user may change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct PlannerSettings {
+    /// Which voxels count as a gain.
+    pub counted: Counted,
     /// Push candidates drawn per decision.
     pub candidates: usize,
     /// Weight of the disturbance term.
@@ -215,6 +263,7 @@ pub struct PlannerSettings {
 impl Default for PlannerSettings {
     fn default() -> Self {
         Self {
+            counted: Counted::default(),
             candidates: 80,
             gamma: GAMMA,
             certain: CERTAIN,

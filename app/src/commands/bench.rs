@@ -8,7 +8,7 @@ use crate::bench::{
 use crate::driver::belief_update;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
-use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
 use nudge_core::scene::Catalog;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
@@ -61,6 +61,9 @@ struct RunArgs {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
+    /// Which voxels a view's gain counts: all that it may see, or those that no look has seen yet
+    #[arg(long, value_name = "all|unseen", default_value_t = Counted::default())]
+    gain: Counted,
     /// Push candidates drawn per decision
     #[arg(long, default_value_t = PlannerSettings::default().candidates)]
     candidates: usize,
@@ -145,7 +148,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         budget: args.budget,
         seeds: args.seeds,
         views: args.views.clone(),
-        planner: PlannerSettings { candidates: args.candidates, ..PlannerSettings::default() },
+        planner: PlannerSettings { counted: args.gain, candidates: args.candidates, ..PlannerSettings::default() },
         policies,
         sets,
         broken,

@@ -5,7 +5,7 @@ use crate::record::mishaps;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
-use nudge_core::plan::{Action, PlannerSettings, PolicyKind, Reason};
+use nudge_core::plan::{Action, Counted, PlannerSettings, PolicyKind, Reason};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::score::{Scores, Verdict};
 use std::path::PathBuf;
@@ -31,6 +31,9 @@ pub struct Args {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
+    /// Which voxels a view's gain counts: all that it may see, or those that no look has seen yet
+    #[arg(long, value_name = "all|unseen", default_value_t = Counted::default())]
+    gain: Counted,
     /// Push candidates drawn per decision
     #[arg(long, default_value_t = PlannerSettings::default().candidates)]
     candidates: usize,
@@ -65,7 +68,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.seed,
         budget: args.budget,
         views: args.views.clone(),
-        planner: PlannerSettings { candidates: args.candidates, ..PlannerSettings::default() },
+        planner: PlannerSettings { counted: args.gain, candidates: args.candidates, ..PlannerSettings::default() },
         noise: None,
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));
@@ -129,6 +132,7 @@ fn same_episode(
             ("--seed", config.seed.to_string()),
             ("--budget", config.budget.to_string()),
             ("--views", config.views.clone()),
+            ("--gain", config.planner.counted.to_string()),
             ("--candidates", config.planner.candidates.to_string()),
         ]
     };

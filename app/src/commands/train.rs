@@ -106,7 +106,7 @@ pub(super) struct ObserveArgs {
     #[arg(long, default_value_t = 32)]
     width: i64,
     /// Most views in a sequence
-    #[arg(long, default_value_t = 10)]
+    #[arg(long, default_value_t = 20)]
     max_views: usize,
 }
 

@@ -15,7 +15,6 @@ use crate::figure;
 use crate::picture;
 use crate::record::{self, Recorder, Setting, State};
 use image::{ImageBuffer, Pixel, PixelWithColorType};
-use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::belief::Belief;
 use nudge_core::episode::{EpisodeDir, EpisodeRecord};
 use nudge_core::files::{TEMPORARY, names_in, write_atomically};
@@ -115,11 +114,9 @@ fn record_of(session: &Session) -> EpisodeRecord {
 }
 
 fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Watch<'_>) -> Result<()> {
-    let arm = ArmTool::new(Arm::placed(&record.scene.robot)?, record.scene.shelf);
-    let unreachable = session.setup.views.unreachable(&session.setup.views.hand_poses(&arm));
     let setting = Setting {
-        arm: &arm,
-        unreachable: &unreachable,
+        arm: &session.setup.arm,
+        unreachable: &session.setup.unreachable,
         shelf: &record.scene.shelf,
         catalog: &session.setup.catalog,
         views: &session.setup.views,
@@ -136,6 +133,7 @@ fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Wa
             step: moment.step,
             bodies: &moment.bodies,
             belief: &belief,
+            seen: moment.seen.as_deref(),
             truth: &moment.truth,
             scores: &moment.scores,
         };

@@ -7,8 +7,8 @@ use super::session::{Activity, Moment, Session, SessionId, Setup};
 use nudge_core::belief::{BeliefUpdate, Classical, SweptPush};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
-use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
-use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason};
+use nudge_core::gain::{RayDensity, gain_per_voxel};
+use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, gain_field};
 use nudge_core::push::swept_by;
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
 use nudge_core::world::TruthMap;
@@ -98,6 +98,7 @@ fn moment(episode: &Episode, outcome: Option<Arc<StepOutcome>>, truth: &mut Arc<
     Arc::new(Moment {
         step: record.steps.len(),
         belief: HalfBelief::of(episode.belief()),
+        seen: episode.seen().cloned().map(Arc::new),
         truth: truth.clone(),
         bodies: Arc::new(episode.bodies()),
         scores: record.steps.last().map_or(record.prior, |step| step.scores),
@@ -170,7 +171,12 @@ pub fn answer(model: &mut Model) {
         Preview { of: (session.id, step), push, prediction: Arc::new(prediction), swept: Arc::new(swept) }
     });
     let source = model.view.map(|view| {
-        let nats = gain_per_voxel(&GainField::new(&belief), &session.setup.views, view, RayDensity::FULL);
+        let nats = gain_per_voxel(
+            &gain_field(&belief, session.moment(step).seen.as_deref()),
+            &session.setup.views,
+            view,
+            RayDensity::FULL,
+        );
         GainSource::new((session.id, step), view, nats)
     });
     model.preview = preview;

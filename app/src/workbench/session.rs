@@ -6,6 +6,7 @@ use nudge_core::arm::ArmTool;
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::{EpisodeRecord, StepOutcome};
+use nudge_core::grid::VoxelSet;
 use nudge_core::plan::Decision;
 use nudge_core::scene::{Body, Catalog};
 use nudge_core::score::Scores;
@@ -24,6 +25,8 @@ pub struct Moment {
     pub step: usize,
     /// What is believed, in half precision.
     pub belief: HalfBelief,
+    /// Voxels that do not count as a gain any more, if the planner leaves some out.
+    pub seen: Option<Arc<VoxelSet>>,
     /// What is; shared by all moments between two pushes.
     pub truth: Arc<TruthMap>,
     /// The bodies where they stand, dropped ones left out; shared like the truth.

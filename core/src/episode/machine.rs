@@ -7,8 +7,8 @@ use crate::arm::Push;
 use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
-use crate::grid::Grid;
-use crate::plan::{self, Action, Decision, History, Reason, Situation};
+use crate::grid::{Grid, VoxelSet};
+use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
 use crate::push::ArmClearance;
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
@@ -18,6 +18,9 @@ use crate::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
+
+/// Probability of change of a floor cell from which what was seen of it counts as unseen.
+const CHANGED: f32 = 0.1;
 
 /// A running episode. A clone is a branch: both go on independently from the same state.
 #[derive(Clone)]
@@ -37,6 +40,8 @@ pub struct Episode {
     belief: Arc<Belief>,
     truth: Arc<TruthMap>,
     history: History,
+    /// Voxels that looks have seen and that no push may have changed since.
+    seen: Arc<VoxelSet>,
     record: EpisodeRecord,
     deciding: Stopwatch,
 }
@@ -92,6 +97,7 @@ impl Episode {
             belief,
             truth,
             history: History::default(),
+            seen: Arc::new(VoxelSet::empty(&grid)),
             record,
             deciding: Stopwatch::default(),
         })
@@ -111,6 +117,7 @@ impl Episode {
             arm: &self.arm,
             unreachable: &self.unreachable,
             history: &self.history,
+            seen: self.seen(),
             budget: self.record.config.budget,
             seed: self.record.config.seed,
             really_look: &really_look,
@@ -151,6 +158,9 @@ impl Episode {
 
         let started = Instant::now();
         self.belief = Arc::new(self.update.observe(&self.belief, &observation));
+        let seen = Arc::make_mut(&mut self.seen);
+        seen.union_with(&observation.free);
+        seen.union_with(&observation.occupied);
         let motion_s = motion.as_ref().map_or(0.0, Motion::duration_s);
         let happened = Happened { motion_s, ..Happened::default() };
         let record = self.file(decision, happened, started, seconds);
@@ -184,8 +194,12 @@ impl Episode {
         // The arm knows how far it came: what it did not sweep is not believed to be free.
         let swept = SweptPush::done(&push, &outcome, &arm.arm, &self.grid());
         let prediction = self.predict(&swept, decision.reason);
-        if let Some(prediction) = &prediction {
-            Arc::make_mut(&mut self.belief).apply(prediction);
+        match &prediction {
+            Some(prediction) => {
+                Arc::make_mut(&mut self.belief).apply(prediction);
+                self.forget_seen(prediction);
+            }
+            None => self.seen = Arc::new(VoxelSet::empty(&self.grid())),
         }
         self.bodies = Arc::new(self.world.bodies());
         self.truth = Arc::new(TruthMap::of(&self.grid(), &self.bodies));
@@ -263,6 +277,16 @@ impl Episode {
             .flatten()
     }
 
+    /// What was seen of columns that a push may have changed is not seen any more.
+    fn forget_seen(&mut self, prediction: &PushPrediction) {
+        let grid = self.grid();
+        let seen = Arc::make_mut(&mut self.seen);
+        let cells = prediction.window.cells(&grid).zip(&prediction.change);
+        for (cell, _) in cells.filter(|(_, chance)| **chance > CHANGED) {
+            grid.column(cell).for_each(|voxel| seen.remove(voxel));
+        }
+    }
+
     /// What a view sees now, noise included: an oracle that asks sees what it will get.
     fn observe(&self, view: &View) -> (Image, MapObservation) {
         let (shelf, intrinsics) = (self.world.shelf(), &self.views.intrinsics);
@@ -316,6 +340,12 @@ impl Episode {
     /// Whether the budget is used up.
     pub fn is_finished(&self) -> bool {
         self.record.steps.len() >= self.record.config.budget
+    }
+
+    /// The voxels that do not count as a gain, when only unseen ones do: those that looks have seen and that no push may
+    /// have changed since.
+    pub fn seen(&self) -> Option<&VoxelSet> {
+        (self.record.config.planner.counted == Counted::Unseen).then_some(&*self.seen)
     }
 
     /// The record so far, as `episode.json` keeps it.

@@ -1,6 +1,6 @@
 use super::super::synthetic;
 use super::*;
-use crate::plan::PolicyKind;
+use crate::plan::{PlannerSettings, PolicyKind};
 use crate::score::Verdict;
 
 /// What a step is but for its seconds.
@@ -67,6 +67,51 @@ fn a_push_moves_objects_and_is_predicted_into_the_belief() {
     assert!(outcome.image.is_none() && outcome.swept.is_some_and(|swept| !swept.swept.is_empty()));
     assert_eq!(episode.history().used_views, []);
     assert_eq!(episode.history().actions.len(), 3);
+}
+
+#[test]
+fn what_looks_have_seen_counts_no_more_until_a_push_changes_it() {
+    let decided = |episode: &Episode, view: u16| episode.decide().gains[usize::from(view)];
+    let mut episode = synthetic::episode(PolicyKind::MemNoPush, 6);
+    assert!(episode.seen().is_some_and(|seen| seen.is_empty()));
+    let first = decided(&episode, 145);
+    let outcome = episode.act(manual(Action::Look { view: ViewId(145) })).expect("a look");
+    let observation = outcome.observation.expect("of a look");
+    let seen = episode.seen().expect("unseen voxels count").clone();
+    assert_eq!(seen.len(), observation.free.len() + observation.occupied.len());
+    // Only what its rays, which are denser than the gain's, did not reach is left to gain from the same place.
+    let again = decided(&episode, 145);
+    assert!(again < 0.05 * first, "{again} of {first}");
+
+    let outcome = episode.act(manual(Action::Push(HEAD_ON))).expect("a push");
+    let (grid, prediction) = (episode.grid(), outcome.prediction.expect("a person's push is predicted"));
+    let now = episode.seen().expect("unseen voxels count");
+    let changed = prediction.window.cells(&grid).zip(&prediction.change).filter(|(_, chance)| **chance > CHANGED);
+    let changed: Vec<usize> = changed.map(|(cell, _)| cell).collect();
+    assert!(!changed.is_empty());
+    for cell in 0..grid.cell_count() {
+        let kept = grid.column(cell).all(|voxel| now.contains(voxel) == seen.contains(voxel));
+        let forgotten = grid.column(cell).all(|voxel| !now.contains(voxel));
+        assert!(if changed.contains(&cell) { forgotten } else { kept }, "cell {cell}");
+    }
+    assert!(decided(&episode, 145) > again, "the push is worth a look");
+}
+
+#[test]
+fn all_voxels_count_when_asked_for_and_a_blind_push_makes_everything_unseen() {
+    let plain = synthetic::config(PolicyKind::MemNoPush, 3);
+    let planner = PlannerSettings { counted: Counted::All, ..plain.planner };
+    let mut episode = synthetic::episode_with(EpisodeConfig { planner, ..plain });
+    assert!(episode.seen().is_none());
+    let before = episode.decide().gains[145];
+    episode.act(manual(Action::Look { view: ViewId(145) })).expect("a look");
+    assert!(episode.decide().gains[145] > 0.05 * before);
+
+    let mut blind = synthetic::episode(PolicyKind::RandomPush5Blind, 6);
+    blind.act(manual(Action::Look { view: ViewId(145) })).expect("a look");
+    let unpredicted = Decision { reason: Reason::Schedule, ..manual(Action::Push(HEAD_ON)) };
+    blind.act(unpredicted).expect("a push");
+    assert!(blind.seen().is_some_and(|seen| seen.is_empty()));
 }
 
 #[test]

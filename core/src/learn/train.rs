@@ -1,6 +1,6 @@
 //! Training sigma_o: recursive over random sequences of views, an update of the weights after every view.
 //!
-//! A batch is a few scenes; for one to ten views the network turns its own last evidence, cut off from its history, and
+//! A batch is a few scenes; for one to `max_views` views the network turns its own last evidence, cut off from its history, and
 //! the next observation into new evidence, whose loss against the truth moves the weights at once (Adam). Occupancy's loss
 //! is taken on a random quarter of the pixels and the semantic KL on a sixteenth: transcendental functions on every voxel
 //! would cost more than the network. The weights that are shown and shipped are a running mean of the trained ones.
@@ -21,16 +21,20 @@ use super::{Dataset, MapSample, VIEWS};
 use crate::cnabu::{
     Card, Cnabu, Evidence, Layout, LossForm, ObserveConfig, ObserveNet, kl_to_uniform, occupancy_loss, semantics_loss,
 };
-use crate::rng::stream;
+use crate::rng::{ChaCha8Rng, stream};
 use crate::scene::CLASS_COUNT;
 use crate::{Error, Result};
 use batch::Batch;
 use rand::Rng;
+use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 use state::State;
 use std::path::Path;
 use tch::nn::VarStore;
 use tch::{Device, Kind, Tensor};
+
+/// Most views that a sequence may have: as many as the longest usual episode.
+const MAX_VIEWS: usize = 40;
 
 /// What a training run is run with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,7 +48,7 @@ pub struct TrainSettings {
     pub batch: usize,
     /// Adam's step size.
     pub learning_rate: f64,
-    /// Most views in a sequence.
+    /// Most views in a sequence; beyond a sample's own they come again, so that going on looking does no harm.
     pub max_views: usize,
     /// Weight of the KL term once it has risen.
     pub kl_weight: f64,
@@ -63,7 +67,7 @@ impl Default for TrainSettings {
             width: 32,
             batch: 4,
             learning_rate: 1e-3,
-            max_views: VIEWS,
+            max_views: 2 * VIEWS,
             kl_weight: 0.02,
             kl_ramp: 1000,
             semantic_weight: 1.0,
@@ -78,7 +82,7 @@ impl TrainSettings {
             ("width", self.width % 8 == 0 && (8..=512).contains(&self.width), "a multiple of 8 up to 512"),
             ("batch", (1..=256).contains(&self.batch), "1 to 256"),
             ("learning rate", self.learning_rate > 0.0 && self.learning_rate < 1.0, "above 0 and below 1"),
-            ("views", (1..=VIEWS).contains(&self.max_views), "1 to 10"),
+            ("views", (1..=MAX_VIEWS).contains(&self.max_views), "1 to 40"),
             ("kl weight", (0.0..=10.0).contains(&self.kl_weight), "0 to 10"),
             ("semantic weight", (0.0..=100.0).contains(&self.semantic_weight), "0 to 100"),
             ("mean decay", (0.0..1.0).contains(&self.mean_decay), "0 to below 1"),
@@ -189,15 +193,15 @@ impl Trainer {
     /// When a sample cannot be read, and [`Error::Check`] when the loss is no longer finite.
     pub fn train(&mut self, data: &Dataset<MapSample>, rate: f64) -> Result<Vec<ViewLoss>> {
         let mut rng = stream(self.settings.seed, "training batch", self.state.batches);
-        let views = rng.random_range(1..=self.settings.max_views);
+        let views = sequence(self.settings.max_views, &mut rng);
         let batch = Batch::draw(data, &self.layout, self.settings.batch, &mut rng)?;
         let device = self.store.device();
         let truth = batch.truth().to_device(device);
         let classes = batch.classes().to_device(device);
         let [x, y] = self.layout.pixels().map(|n| n as i64);
         let mut evidence = Evidence::uniform(self.settings.batch as i64, [x, y], device);
-        let mut losses = Vec::with_capacity(views);
-        for view in 0..views {
+        let mut losses = Vec::with_capacity(views.len());
+        for (at, view) in views.into_iter().enumerate() {
             let (observed, labels) = batch.view(view);
             let (observed, labels) = (observed.to_device(device), labels.to_device(device));
             let (z_occupancy, z_semantics) = self.net.forward(&evidence, &observed, &labels);
@@ -231,7 +235,7 @@ impl Trainer {
             loss.backward();
             self.state.update(self.settings.learning_rate * rate, self.settings.mean_decay);
             evidence = Evidence::of_heads(&z_occupancy, &z_semantics);
-            losses.push(ViewLoss { views: view + 1, occupancy, semantics });
+            losses.push(ViewLoss { views: at + 1, occupancy, semantics });
         }
         self.state.batches += 1;
         Ok(losses)
@@ -249,6 +253,17 @@ impl Trainer {
     pub fn mean_weights(&self) -> Vec<(String, Tensor)> {
         self.state.mean_weights()
     }
+}
+
+/// One to `longest` views of a sample: all of them in a random order, and then some again, as an episode goes on looking
+/// when it has seen what there is to see.
+fn sequence(longest: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
+    let length = rng.random_range(1..=longest);
+    let mut views: Vec<usize> = (0..VIEWS).collect();
+    views.shuffle(rng);
+    views.extend((VIEWS..length).map(|_| rng.random_range(0..VIEWS)));
+    views.truncate(length);
+    views
 }
 
 #[cfg(test)]

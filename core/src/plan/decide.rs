@@ -2,9 +2,9 @@
 
 use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated};
 use super::weigh::{Weighed, random_push, weigh_pushes};
-use super::{Action, Decision, PlannerSettings, PolicyKind, Reason, Situation};
+use super::{Action, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field};
 use crate::camera::ViewId;
-use crate::gain::{GainField, RayDensity, best_pair, gain_of_views};
+use crate::gain::{RayDensity, best_pair, gain_of_views};
 use crate::rng::stream;
 use rand::Rng;
 use rayon::prelude::*;
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situation<'_>) -> Decision {
     let (history, views) = (situation.history, situation.views);
     let step = history.actions.len();
-    let field = GainField::new(situation.belief);
+    let field = gain_field(situation.belief, situation.seen);
     let ids: Vec<ViewId> = views.views.iter().map(|view| view.id).collect();
     let gains = gain_of_views(&field, views, &ids, RayDensity::FULL);
     let mut fresh = gains.clone();

@@ -10,8 +10,8 @@ use nudge_core::arm::Push;
 use nudge_core::belief::SweptPush;
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
-use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
-use nudge_core::plan::{Action, Decision, PolicyKind, Reason};
+use nudge_core::gain::{RayDensity, gain_per_voxel};
+use nudge_core::plan::{Action, Decision, PolicyKind, Reason, gain_field};
 use nudge_core::push::swept_by;
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
@@ -380,7 +380,7 @@ impl App {
         let (of, views) = ((session.id, moment.step), session.setup.views.clone());
         self.asked_gain = Some((of, view));
         self.background.gain.ask(move |_| {
-            let field = GainField::new(&moment.belief.belief());
+            let field = gain_field(&moment.belief.belief(), moment.seen.as_deref());
             let nats = gain_per_voxel(&field, &views, view, RayDensity::FULL);
             Some(GainSource::new(of, view, nats))
         });

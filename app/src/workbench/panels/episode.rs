@@ -4,7 +4,7 @@ use crate::driver::{BELIEFS, belief_update};
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session};
-use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
 use rerun::external::egui;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -185,6 +185,20 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
             .labelled_by(label.id)
             .on_hover_text("Seed of every random choice, any whole number from 0");
         ui.end_row();
+        let label = ui.label("gain of");
+        egui::ComboBox::from_id_salt("gain of")
+            .selected_text(gain_of(form.planner.counted))
+            .show_ui(ui, |ui| {
+                for counted in Counted::ALL {
+                    ui.selectable_value(&mut form.planner.counted, counted, gain_of(counted));
+                }
+            })
+            .response
+            .labelled_by(label.id)
+            .on_hover_text(
+                "Which voxels a view's gain counts: those that no look has seen yet, or all as in the paper",
+            );
+        ui.end_row();
         let label = ui.label("candidates");
         ui.add(egui::DragValue::new(&mut form.planner.candidates).range(0..=1000))
             .labelled_by(label.id)
@@ -197,6 +211,14 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
         ui.end_row();
     });
     ui.collapsing("Thresholds", |ui| thresholds(ui, &mut form.planner));
+}
+
+/// Which voxels count, in words.
+fn gain_of(counted: Counted) -> &'static str {
+    match counted {
+        Counted::All => "all voxels",
+        Counted::Unseen => "unseen voxels",
+    }
 }
 
 /// A share between 0 and 1.

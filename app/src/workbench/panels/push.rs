@@ -246,7 +246,7 @@ impl Here<'_> {
         ];
         facts::show(ui, "push numbers", 2, &facts);
         if let Some(rejection) = &candidate.rejection {
-            ui.label(format!("Rejected: {}", words::rejection(rejection)));
+            ui.label(format!("Rejected: {}", rejection));
         }
         let asked = |preview: &&Preview| preview.of == (self.session.id, self.step) && preview.push == candidate.push;
         match self.model.preview.as_ref().filter(asked) {
@@ -379,7 +379,7 @@ fn change_at(prediction: &PushPrediction, grid: &Grid, cell: usize) -> f32 {
 /// A candidate in words, for the tooltip.
 fn describe(at: usize, candidate: &CandidateRecord, gamma: f32) -> String {
     match (&candidate.rejection, weighed::value(candidate, gamma)) {
-        (Some(rejection), _) => format!("Push {at}, rejected: {}", words::rejection(rejection)),
+        (Some(rejection), _) => format!("Push {at}, rejected: {}", rejection),
         (None, None) => format!("Push {at}: not weighed"),
         (None, Some(value)) => {
             let gain = words::nats(candidate.gain.unwrap_or(0.0));

@@ -154,13 +154,13 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
         let (note, hint) = match &candidate.rejection {
             _ if pushed == Some(at) => ("chosen".to_owned(), String::new()),
             _ if decision.best_push == Some(at) => ("best".to_owned(), String::new()),
-            Some(rejection) => ("rejected".to_owned(), words::capital(&words::rejection(rejection))),
+            Some(rejection) => ("rejected".to_owned(), words::capital(&rejection.to_string())),
             None => (String::new(), String::new()),
         };
         let place = format!("From x {}, y {} m", words::metres(push.start[0]), words::metres(push.start[1]));
         let view = candidate.view.map_or_else(String::new, |view| format!("; best seen from view {}", view.0));
         let name = match (&candidate.rejection, value(candidate, gamma)) {
-            (Some(rejection), _) => format!("Push {at}, rejected: {}", words::rejection(rejection)),
+            (Some(rejection), _) => format!("Push {at}, rejected: {}", rejection),
             (None, Some(value)) => format!("Push {at}, value {}", words::nats(value)),
             (None, None) => format!("Push {at}, not weighed"),
         };

@@ -3,7 +3,6 @@
 pub(crate) use crate::record::decision::{action, capital, reason, thousands};
 
 use nudge_core::grid::{Cell, Grid, Voxel};
-use nudge_core::push::Rejection;
 use rerun::external::egui::{RichText, TextStyle};
 
 /// What stands where a number is not one.
@@ -70,15 +69,6 @@ pub fn cell_place(grid: &Grid, cell: Cell) -> String {
 pub fn voxel_place(grid: &Grid, voxel: Voxel) -> String {
     let at = grid.center(voxel);
     format!("x {}, y {}, z {} m", metres(at.x), metres(at.y), metres(at.z))
-}
-
-/// Why a push is no candidate.
-pub fn rejection(rejection: &Rejection) -> String {
-    let place = |at: &[f32; 3]| format!("x {}, y {}, z {} m", metres(at[0]), metres(at[1]), metres(at[2]));
-    match rejection {
-        Rejection::NoTarget => "nothing likely within reach to push at".to_owned(),
-        arm @ (Rejection::Unreachable { .. } | Rejection::ArmBlocked { .. } | Rejection::NoWay) => arm.to_string(),
-    }
 }
 
 /// A number in a column: small, with digits of one width.

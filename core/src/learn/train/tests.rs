@@ -210,3 +210,21 @@ fn sigma_m_learns_what_a_push_does_and_predicts_inside_its_window() {
         }
     }
 }
+
+#[test]
+fn sequences_show_every_view_before_any_comes_again() {
+    let mut rng = crate::rng::stream(1, "sequences", 0);
+    let mut longest = 0;
+    let mut firsts = std::collections::BTreeSet::new();
+    for _ in 0..400 {
+        let views = super::sequence(20, &mut rng);
+        longest = longest.max(views.len());
+        assert!((1..=20).contains(&views.len()));
+        let mut first: Vec<usize> = views.iter().copied().take(VIEWS).collect();
+        firsts.insert(first[0]);
+        first.sort_unstable();
+        first.dedup();
+        assert_eq!(first.len(), views.len().min(VIEWS), "{views:?}");
+    }
+    assert_eq!((longest, firsts.len()), (20, VIEWS), "all lengths, in all orders");
+}

@@ -130,15 +130,15 @@ fn arrivals(field: &GainField, array: &ViewArray, view: ViewId, density: RayDens
 }
 
 /// Sum over a view's rays, in units of 2^-24 nats.
-fn view_gain(field: &GainField, camera: &Camera, density: RayDensity) -> u64 {
+fn view_gain(field: &GainField, camera: &Camera, density: RayDensity) -> i64 {
     let mut sum = 0;
-    camera.for_each_ray(field, density, |_, ray| sum += u64::from(ray_gain(field, ray)));
+    camera.for_each_ray(field, density, |_, ray| sum += i64::from(ray_gain(field, ray)));
     sum
 }
 
-/// A ray's gain in units of 2^-24 nats. A ray gains less than 4 nats, so this fits.
+/// A ray's gain in units of 2^-24 nats. A ray gains, or owes, less than 4 nats, so this fits.
 #[inline(always)]
-fn ray_gain(field: &GainField, ray: Ray) -> u32 {
+fn ray_gain(field: &GainField, ray: Ray) -> i32 {
     struct Gain(f32);
     impl Tally for Gain {
         #[inline(always)]
@@ -165,11 +165,11 @@ fn ray_gain(field: &GainField, ray: Ray) -> u32 {
 }
 
 /// Nats to units of 2^-24 nats.
-fn fixed(nats: f32) -> u32 {
-    (nats * 16_777_216.0).round() as u32
+fn fixed(nats: f32) -> i32 {
+    (nats * 16_777_216.0).round() as i32
 }
 
 /// Units of 2^-24 nats to nats.
-fn nats(sum: u64) -> f32 {
+fn nats(sum: i64) -> f32 {
     (sum as f64 / 16_777_216.0) as f32
 }

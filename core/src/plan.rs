@@ -203,9 +203,10 @@ impl Situation<'_> {
 #[serde(rename_all = "snake_case")]
 pub enum Counted {
     /// All that the view may see, as in the paper.
-    All,
-    /// Those that no look has seen yet, or not since a push may have changed them.
     #[default]
+    All,
+    /// Those that no look has seen yet, or not since a push may have changed them. What a push would make uncertain of
+    /// what was seen counts against it.
     Unseen,
 }
 

@@ -72,7 +72,7 @@ fn a_push_moves_objects_and_is_predicted_into_the_belief() {
 #[test]
 fn what_looks_have_seen_counts_no_more_until_a_push_changes_it() {
     let decided = |episode: &Episode, view: u16| episode.decide().gains[usize::from(view)];
-    let mut episode = synthetic::episode(PolicyKind::MemNoPush, 6);
+    let mut episode = counting_unseen(PolicyKind::MemNoPush, 6);
     assert!(episode.seen().is_some_and(|seen| seen.is_empty()));
     let first = decided(&episode, 145);
     let outcome = episode.act(manual(Action::Look { view: ViewId(145) })).expect("a look");
@@ -98,20 +98,25 @@ fn what_looks_have_seen_counts_no_more_until_a_push_changes_it() {
 }
 
 #[test]
-fn all_voxels_count_when_asked_for_and_a_blind_push_makes_everything_unseen() {
-    let plain = synthetic::config(PolicyKind::MemNoPush, 3);
-    let planner = PlannerSettings { counted: Counted::All, ..plain.planner };
-    let mut episode = synthetic::episode_with(EpisodeConfig { planner, ..plain });
+fn all_voxels_count_as_they_are_and_a_blind_push_makes_everything_unseen() {
+    let mut episode = synthetic::episode(PolicyKind::MemNoPush, 3);
     assert!(episode.seen().is_none());
     let before = episode.decide().gains[145];
     episode.act(manual(Action::Look { view: ViewId(145) })).expect("a look");
     assert!(episode.decide().gains[145] > 0.05 * before);
 
-    let mut blind = synthetic::episode(PolicyKind::RandomPush5Blind, 6);
+    let mut blind = counting_unseen(PolicyKind::RandomPush5Blind, 6);
     blind.act(manual(Action::Look { view: ViewId(145) })).expect("a look");
     let unpredicted = Decision { reason: Reason::Schedule, ..manual(Action::Push(HEAD_ON)) };
     blind.act(unpredicted).expect("a push");
     assert!(blind.seen().is_some_and(|seen| seen.is_empty()));
+}
+
+/// An episode in which only unseen voxels count as a gain.
+fn counting_unseen(policy: PolicyKind, budget: usize) -> Episode {
+    let plain = synthetic::config(policy, budget);
+    let planner = PlannerSettings { counted: Counted::Unseen, ..plain.planner };
+    synthetic::episode_with(EpisodeConfig { planner, ..plain })
 }
 
 #[test]

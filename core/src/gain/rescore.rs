@@ -18,9 +18,9 @@ pub struct RayGains {
 struct ViewRays {
     camera: Camera,
     /// Sum over the rays, in units of 2^-24 nats.
-    sum: u64,
+    sum: i64,
     /// Gain by ray number, in the same units; 0 for rays that do not enter the shelf.
-    gains: Vec<u32>,
+    gains: Vec<i32>,
     /// What the ray crossed, by ray number.
     reached: Vec<Reached>,
 }
@@ -82,16 +82,16 @@ impl ViewRays {
                 reached[number] = Reached::between(field, &entering, tally.last);
             }
         });
-        Self { camera, sum: gains.iter().map(|&gain| u64::from(gain)).sum(), gains, reached }
+        Self { camera, sum: gains.iter().map(|&gain| i64::from(gain)).sum(), gains, reached }
     }
 
-    fn sum_under(&self, field: &GainField, changed: &Reached, density: RayDensity) -> u64 {
+    fn sum_under(&self, field: &GainField, changed: &Reached, density: RayDensity) -> i64 {
         let mut sum = self.sum;
         self.camera.for_rays(
             field,
             density,
             |number| self.reached[number].touches(changed),
-            |number, ray| sum = sum + u64::from(ray_gain(field, ray)) - u64::from(self.gains[number]),
+            |number, ray| sum = sum + i64::from(ray_gain(field, ray)) - i64::from(self.gains[number]),
         );
         sum
     }

@@ -102,6 +102,32 @@ fn seen_voxels_block_but_no_longer_inform() {
 }
 
 #[test]
+fn a_push_owes_what_it_makes_uncertain_of_what_was_seen() {
+    let (array, density, grid) = (standard(), RayDensity::COARSE, small_grid());
+    let ids: Vec<ViewId> = (0..300).step_by(37).map(ViewId).collect();
+    let mut all = VoxelSet::empty(&grid);
+    (0..grid.voxel_count()).for_each(|index| all.insert(index));
+    let mut most = 0.0_f32;
+    for seed in 0..12 {
+        let belief = patchy(grid, seed);
+        let mut prediction = prediction(&grid, seed);
+        prediction.change.fill(0.25);
+        let unknown = GainField::new(&after(&belief, &prediction));
+        let seen = GainField::new(&belief).with_seen(&all);
+        let owed = gain_of_views(&seen.with_prediction(&prediction), &array, &ids, density);
+        let inside: Vec<usize> = prediction.window.cells(&grid).flat_map(|cell| grid.column(cell)).collect();
+        for (&view, owed) in ids.iter().zip(&owed) {
+            let parts = gain_per_voxel(&unknown, &array, view, density);
+            let there: f64 = parts.iter().filter(|part| inside.contains(&part.0)).map(|part| f64::from(part.1)).sum();
+            assert!((f64::from(*owed) + 0.25 * there).abs() < 1e-3 * there.max(1.0), "{owed} {there}");
+            most = most.max(-owed);
+        }
+        assert_eq!(RayGains::new(&seen, &array, &ids, density).under(&prediction), owed);
+    }
+    assert!(most > 1.0, "{most}");
+}
+
+#[test]
 fn the_lazy_pair_is_the_greedy_pair() {
     let (array, density) = (standard(), RayDensity { stride_px: 24 });
     let ids: Vec<ViewId> = (0..300).map(ViewId).collect();

@@ -114,6 +114,20 @@ fn to_json(document: &impl Serialize) -> anyhow::Result<String> {
     Ok(serde_json::to_string_pretty(document)? + "\n")
 }
 
+/// Where the networks run.
+#[derive(clap::Args, Debug)]
+struct DeviceArgs {
+    /// Device of the networks: auto (CUDA when it is there), cpu or cuda [default: $NUDGE_DEVICE, or auto]
+    #[arg(long, value_name = "auto|cpu|cuda")]
+    device: Option<String>,
+}
+
+impl DeviceArgs {
+    fn choose(&self) -> nudge_core::Result<()> {
+        self.device.as_deref().map_or(Ok(()), nudge_core::cnabu::choose_device)
+    }
+}
+
 /// What to say when networks are asked for in a build without them.
 #[cfg(not(feature = "cnabu"))]
 fn no_networks() -> nudge_core::Error {

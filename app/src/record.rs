@@ -149,8 +149,13 @@ impl Recorder {
     /// Records a state with what led to it: without an outcome the prior. States come in the order of their steps.
     pub fn record(&mut self, setting: &Setting<'_>, state: &State<'_>, outcome: Option<&StepOutcome>) -> Result<()> {
         let nats = outcome.map_or_else(Vec::new, |outcome| self.gain_of_voxels(setting, outcome));
+        let surprise = outcome.and_then(|outcome| outcome.prediction.as_ref()).zip(self.truth.as_ref());
+        let surprise = surprise
+            .map(|(predicted, before)| predicted.surprise(&state.belief.grid, &before.changed_cells(state.truth)));
         self.robot(setting, state.step, outcome)?;
         self.state(setting, state)?;
+        let surprise = surprise.map(|surprise| floor::surprise(&state.belief.grid, &surprise));
+        self.log_or_clear(paths::PREDICTED_SURPRISE, surprise)?;
         match outcome {
             Some(outcome) => self.outcome(setting, state.belief, outcome, &nats)?,
             None => {

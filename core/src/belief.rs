@@ -155,7 +155,26 @@ pub struct PushPrediction {
     pub change: Vec<f32>,
 }
 
+/// A prediction is taken to be no surer than this of a floor cell's changing or staying: 1 %.
+const SUREST: f32 = 0.01;
+/// The largest surprise of a floor cell, nats: what was as good as ruled out happened.
+pub const MOST_SURPRISING: f32 = 4.605_17;
+
 impl PushPrediction {
+    /// Per floor cell, how surprising what happened is: `-ln` of the probability that was given to the cell's changing or
+    /// staying as it did, nats, at most [`MOST_SURPRISING`]. Cells outside the window were predicted to stay.
+    pub fn surprise(&self, grid: &Grid, changed: &[bool]) -> Vec<f32> {
+        let mut chance = vec![0.0; grid.cell_count()];
+        for (cell, change) in self.window.cells(grid).zip(&self.change) {
+            chance[cell] = if change.is_finite() { *change } else { 0.5 };
+        }
+        let surprise = |(chance, changed): (&f32, &bool)| {
+            let given = if *changed { *chance } else { 1.0 - chance };
+            -given.max(SUREST).ln()
+        };
+        chance.iter().zip(changed).map(surprise).collect()
+    }
+
     /// `H_s(belief) - H_s(predicted)`, nats: negative when the push blurs more labels than it settles. `belief` is the
     /// one that the prediction was made from; cells outside the window cancel out.
     pub fn semantic_entropy_drop(&self, belief: &Belief) -> f64 {

@@ -49,7 +49,7 @@ pub use weights::{Card, card_path, read_tensors, write_tensors};
 use crate::Result;
 use crate::belief::BeliefUpdate;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// File name of sigma_m's weights; without it pushes are predicted classically.
 pub const PUSH_WEIGHTS: &str = "sigma_m.safetensors";
@@ -75,10 +75,35 @@ pub fn models_dir() -> Option<PathBuf> {
     beside.chain(rest).find(|directory| directory.join(OBSERVE_WEIGHTS).is_file())
 }
 
-/// The device that [`DEVICE_ENV`] names, CUDA when it is there otherwise.
+/// What [`choose_device`] was told.
+static CHOSEN: OnceLock<String> = OnceLock::new();
+
+/// Chooses the device that weights are loaded onto, before [`DEVICE_ENV`]; the first choice holds.
+///
+/// # Errors
+/// [`Error::Usage`](crate::Error::Usage) for another name than `auto`, `cpu` and `cuda`, and for `cuda` where there is none.
+pub fn choose_device(name: &str) -> Result<()> {
+    #[cfg(feature = "cnabu")]
+    device(name)?;
+    #[cfg(not(feature = "cnabu"))]
+    match name {
+        "auto" | "cpu" => (),
+        "cuda" => return Err(crate::Error::Usage("device cuda: this build has no networks to run on it".to_owned())),
+        other => return Err(unknown_device(other)),
+    }
+    CHOSEN.get_or_init(|| name.to_owned());
+    Ok(())
+}
+
+fn unknown_device(name: &str) -> crate::Error {
+    crate::Error::Usage(format!("unknown device \"{name}\"; there are auto, cpu, cuda"))
+}
+
+/// The device that was chosen or that [`DEVICE_ENV`] names, CUDA when it is there otherwise.
 #[cfg(feature = "cnabu")]
 fn chosen_device() -> Result<Device> {
-    device(&std::env::var(DEVICE_ENV).unwrap_or_else(|_| "auto".to_owned()))
+    let named = CHOSEN.get().cloned().or_else(|| std::env::var(DEVICE_ENV).ok());
+    device(named.as_deref().unwrap_or("auto"))
 }
 
 /// Number of threads that libtorch computes with.
@@ -98,7 +123,7 @@ pub fn device(name: &str) -> Result<Device> {
         "cpu" => Ok(Device::Cpu),
         "cuda" if tch::Cuda::is_available() => Ok(Device::Cuda(0)),
         "cuda" => Err(crate::Error::Usage("device cuda: this libtorch finds no CUDA device".to_owned())),
-        other => Err(crate::Error::Usage(format!("unknown device \"{other}\"; there are auto, cpu, cuda"))),
+        other => Err(unknown_device(other)),
     }
 }
 

@@ -147,3 +147,15 @@ fn wrong_use() {
     assert_eq!(nudge(&["dance"]).status.code(), Some(2));
     assert!(nudge_fails(2, &["views", "--array", "nowhere"]).contains("nowhere"));
 }
+
+#[test]
+fn a_device_that_is_not_there_is_refused_before_anything_is_written() {
+    let folder = Folder::new();
+    let out = folder.path("e");
+    let out = out.to_str().expect("utf-8");
+    let line = nudge_fails(2, &["run", "scenes/high/key-blocker.toml", "--device", "gpu", "--out", out]);
+    assert!(line.contains("unknown device \"gpu\"; there are auto, cpu, cuda"), "{line}");
+    let line = nudge_fails(2, &["bench", "scenes/high", "--device", "tpu", "--out", out]);
+    assert!(line.contains("unknown device \"tpu\""), "{line}");
+    assert!(!std::path::Path::new(out).exists(), "half-written");
+}

@@ -58,6 +58,8 @@ struct RunArgs {
     /// How beliefs are updated: cnabu or classical (default: what each policy is published with)
     #[arg(long)]
     belief: Option<String>,
+    #[command(flatten)]
+    device: super::DeviceArgs,
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
@@ -98,6 +100,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn run_bench(args: &RunArgs) -> anyhow::Result<()> {
+    args.device.choose()?;
     let plan = plan(args)?;
     for BrokenScene { error, .. } in &plan.broken {
         warn(&format!("left out: {error}"));

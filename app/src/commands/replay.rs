@@ -12,6 +12,8 @@ use std::sync::Arc;
 pub struct Args {
     /// The episode's directory
     episode: PathBuf,
+    #[command(flatten)]
+    device: super::DeviceArgs,
     /// Print what was found as JSON
     #[arg(long)]
     json: bool,
@@ -19,6 +21,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    args.device.choose()?;
     let directory = EpisodeDir::open(&args.episode)?;
     let record = directory.record()?;
     let (update, _) = belief_update(Some(&record.config.belief), record.config.policy)?;

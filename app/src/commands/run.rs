@@ -28,6 +28,8 @@ pub struct Args {
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    device: super::DeviceArgs,
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
@@ -53,6 +55,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    args.device.choose()?;
     let catalog = Arc::new(Catalog::standard());
     let (scene, warnings) = Scene::load(&args.scene, &catalog)?;
     for warning in warnings {

@@ -4,7 +4,7 @@ use super::paths;
 use super::shapes::segmentation;
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture::{self, FloorPlan, RgbImage};
-use nudge_core::belief::{Belief, PushPrediction};
+use nudge_core::belief::{Belief, MOST_SURPRISING, PushPrediction};
 use nudge_core::camera::ViewArray;
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, Decision};
@@ -84,6 +84,11 @@ pub fn predicted_change(grid: &Grid, prediction: &PushPrediction) -> rerun::Imag
     picture(&picture::paint(grid, |cell| Colormap::Viridis.rgb(change[cell])))
 }
 
+/// Surprise per cell, 0 to [`MOST_SURPRISING`] nats (magma).
+pub fn surprise(grid: &Grid, surprise: &[f32]) -> rerun::Image {
+    picture(&picture::paint(grid, |cell| Colormap::Magma.rgb(surprise[cell] / MOST_SURPRISING)))
+}
+
 /// The true objects' outlines over a floor map.
 pub fn outlines(truth: &TruthMap) -> rerun::LineStrips2D {
     let runs = picture::outlines(truth).into_iter().map(|run| run.map(|[x, y]| [x as f32, y as f32]));
@@ -108,6 +113,7 @@ pub fn legends(grid: &Grid) -> Vec<(&'static str, Scale)> {
         (paths::BELIEF_ENTROPY, scale(grid, Colormap::Magma, ["0", &format!("{nats:.0} nats")])),
         (paths::BELIEF_CERTAINTY, scale(grid, Colormap::Viridis, ["0", "1"])),
         (paths::PREDICTED_CHANGE, scale(grid, Colormap::Viridis, ["0", "1"])),
+        (paths::PREDICTED_SURPRISE, scale(grid, Colormap::Magma, ["0", &format!("{MOST_SURPRISING:.1} nats")])),
     ]
 }
 

@@ -7,7 +7,8 @@ use crate::picture::FloorPlan;
 use rerun::external::re_sdk_types::blueprint::{archetypes as bp, components as bpc};
 
 /// The floor maps with a colour scale below them.
-const SCALED: [&str; 3] = [paths::BELIEF_ENTROPY, paths::BELIEF_CERTAINTY, paths::PREDICTED_CHANGE];
+const SCALED: [&str; 4] =
+    [paths::BELIEF_ENTROPY, paths::BELIEF_CERTAINTY, paths::PREDICTED_CHANGE, paths::PREDICTED_SURPRISE];
 
 /// The layout for an episode recorded under `root`, on a floor plan of the given size.
 pub fn standard(root: &str, plan: FloorPlan) -> Layout {
@@ -68,8 +69,11 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
         map("Truth", paths::TRUTH_LABELS, false),
         map("Predicted", paths::PREDICTED_SEMANTICS, false),
     ];
-    let certainty_maps =
-        vec![map("Certainty", paths::BELIEF_CERTAINTY, false), map("Predicted change", paths::PREDICTED_CHANGE, true)];
+    let certainty_maps = vec![
+        map("Certainty", paths::BELIEF_CERTAINTY, false),
+        map("Predicted change", paths::PREDICTED_CHANGE, true),
+        map("Surprise", paths::PREDICTED_SURPRISE, true),
+    ];
     let right_maps = vec![(1.0, Part::Tabs(error_maps)), (1.0, Part::Tabs(certainty_maps))];
     let maps = Part::Row(vec![(1.0, Part::Column(left_maps)), (1.0, Part::Column(right_maps)), (0.36, legend)]);
     let flat = |name: &str, path: &str| {

@@ -58,6 +58,8 @@ pub const PREDICTED_OCCUPANCY: &str = "predicted/occupancy";
 pub const PREDICTED_SEMANTICS: &str = "predicted/semantics";
 /// Probability per floor cell that the push changes it.
 pub const PREDICTED_CHANGE: &str = "predicted/change";
+/// How surprising, per floor cell, what the push did is under the prediction.
+pub const PREDICTED_SURPRISE: &str = "predicted/surprise";
 /// The true objects as voxels.
 pub const TRUTH_OCCUPANCY: &str = "truth/occupancy";
 /// The true class per floor cell.

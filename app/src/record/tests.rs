@@ -78,6 +78,7 @@ fn entities_are_named_as_the_contract_says() {
         (paths::PREDICTED_OCCUPANCY, "predicted/occupancy"),
         (paths::PREDICTED_SEMANTICS, "predicted/semantics"),
         (paths::PREDICTED_CHANGE, "predicted/change"),
+        (paths::PREDICTED_SURPRISE, "predicted/surprise"),
         (paths::DECISION, "decision"),
         (paths::NOTES, "notes"),
         (paths::VERDICTS, "verdicts"),

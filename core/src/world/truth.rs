@@ -28,6 +28,15 @@ struct PlacedPart {
 }
 
 impl TruthMap {
+    /// Per floor cell, whether anything in its column differs from another truth over the same grid: a voxel, the class,
+    /// or which object it is.
+    pub fn changed_cells(&self, after: &Self) -> Vec<bool> {
+        let height = self.dims[2];
+        let columns = self.occupancy.chunks(height).zip(after.occupancy.chunks(height));
+        let tops = self.labels.iter().zip(&self.objects).zip(after.labels.iter().zip(&after.objects));
+        columns.zip(tops).map(|((a, b), (top_a, top_b))| a != b || top_a != top_b).collect()
+    }
+
     /// Voxelises bodies exactly: point in shape at voxel centres. Where two bodies reach the same level of a column,
     /// its label is the earlier one's.
     pub fn of(grid: &Grid, bodies: &[Body]) -> Self {

@@ -18,7 +18,7 @@ use crate::workbench::derive::{Derived, MapKind};
 use crate::workbench::model::{Hovered, Model, Picked, Preview};
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::arm::Push;
-use nudge_core::belief::PushPrediction;
+use nudge_core::belief::{MOST_SURPRISING, PushPrediction};
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, CandidateRecord, Decision};
 use rerun::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
@@ -33,6 +33,7 @@ enum Shown {
     Predicted(Push),
     Change(Push),
     After,
+    Surprise,
 }
 
 /// What the panel remembers.
@@ -358,7 +359,36 @@ impl Here<'_> {
         state.review = Some(review);
         ui.add_space(8.0);
         push_review::show(ui, &review, &self.session.record, moment);
+        self.surprise(state, ui);
         motion::show(ui, &mut state.motion, self.session.id, moment);
+    }
+
+    /// Where the push that led to the state at the cursor did what was not expected of it.
+    fn surprise(&self, state: &mut State, ui: &mut Ui) {
+        let (before, after) = (self.session.moment(self.step - 1), self.session.moment(self.step));
+        let Some(prediction) = after.outcome.as_ref().and_then(|outcome| outcome.prediction.as_ref()) else { return };
+        let (grid, ctx) = (self.grid, ui.ctx().clone());
+        let picture = state.textures.get(&ctx, (self.session.id, self.step, Shown::Surprise), || {
+            let surprise = prediction.surprise(&grid, &before.truth.changed_cells(&after.truth));
+            textures::of_rgb(&picture::paint(&grid, |cell| Colormap::Magma.rgb(surprise[cell] / MOST_SURPRISING)))
+        });
+        let outlines = state.outlines_after.of(&after.bodies);
+        heading(ui, "Surprise", "How improbable the prediction held what happened to each floor cell");
+        let width = ui.available_width().clamp(40.0, 420.0);
+        let picked = maps::picked_cell(self.model.picked, &grid);
+        let name = "Map of the push: surprise";
+        FloorMap { grid: &grid, picture: Some(&picture), outlines: &outlines, picked, apron_m: 0.0, name }
+            .show(ui, width);
+        ui.scope(|ui| {
+            ui.set_max_width(width);
+            let texts = Bar {
+                name: "surprise",
+                ends: ["0".to_owned(), format!("{MOST_SURPRISING:.1}")],
+                unit: "nats of surprise",
+                hint: "−ln of the probability given to the cell's changing or staying as it did",
+            };
+            legend::bar(ui, &texts, |t| Colormap::Magma.rgb(t));
+        });
     }
 }
 

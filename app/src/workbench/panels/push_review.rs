@@ -6,14 +6,13 @@ use crate::workbench::session::{Moment, SessionId};
 use nudge_core::belief::PushPrediction;
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::grid::Grid;
-use nudge_core::world::TruthMap;
 use rerun::external::egui::Ui;
 
 /// A floor cell whose predicted probability of change is above this is predicted to change.
 const CHANGES: f32 = 0.5;
 
 /// Prediction and truth of a push, counted in floor cells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Review {
     /// The episode and the number of actions with the push.
     pub of: (SessionId, usize),
@@ -23,6 +22,8 @@ pub struct Review {
     pub changed: usize,
     /// Cells that were predicted to change and did.
     pub both: usize,
+    /// How surprising what happened is, all floor cells together, nats; `None` if nothing was predicted.
+    pub surprise_nats: Option<f32>,
 }
 
 impl Review {
@@ -30,13 +31,15 @@ impl Review {
     pub fn of(id: SessionId, before: &Moment, after: &Moment) -> Self {
         let grid = after.belief.grid();
         let prediction = after.outcome.as_ref().and_then(|outcome| outcome.prediction.as_ref());
-        let changed = changed_cells(grid, &before.truth, &after.truth);
+        let changed = before.truth.changed_cells(&after.truth);
         let predicted = prediction.map(|prediction| predicted_cells(grid, prediction));
         let count = |cells: &[bool]| cells.iter().filter(|cell| **cell).count();
         let both = predicted.as_ref().map_or(0, |predicted| {
             predicted.iter().zip(&changed).filter(|(predicted, changed)| **predicted && **changed).count()
         });
-        Self { of: (id, after.step), predicted: predicted.as_deref().map(count), changed: count(&changed), both }
+        let surprise_nats = prediction.map(|prediction| prediction.surprise(grid, &changed).iter().sum());
+        let predicted = predicted.as_deref().map(count);
+        Self { of: (id, after.step), predicted, changed: count(&changed), both, surprise_nats }
     }
 
     /// Share of the cells predicted to change that did.
@@ -48,17 +51,6 @@ impl Review {
     fn recall(&self) -> Option<f32> {
         (self.predicted.is_some() && self.changed > 0).then(|| self.both as f32 / self.changed as f32)
     }
-}
-
-/// Whether anything in a cell's column differs between two truths.
-fn changed_cells(grid: &Grid, before: &TruthMap, after: &TruthMap) -> Vec<bool> {
-    let differs = |cell: usize| {
-        let column = grid.column(cell);
-        before.labels.get(cell) != after.labels.get(cell)
-            || before.objects.get(cell) != after.objects.get(cell)
-            || before.occupancy.get(column.clone()) != after.occupancy.get(column)
-    };
-    (0..grid.cell_count()).map(differs).collect()
 }
 
 fn predicted_cells(grid: &Grid, prediction: &PushPrediction) -> Vec<bool> {
@@ -104,6 +96,11 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
         fact("both", review.both.to_string(), "Cells that were predicted to change and did"),
         fact("precision", share(review.precision()), "Share of the cells predicted to change that did"),
         fact("recall", share(review.recall()), "Share of the cells that changed which were predicted to"),
+        fact(
+            "surprise",
+            review.surprise_nats.map_or("n/a".to_owned(), words::nats),
+            "−ln of the probability given to what happened, all floor cells together",
+        ),
     ];
     facts::show(ui, "push review", 2, &facts);
 }
@@ -113,6 +110,7 @@ mod tests {
     use super::*;
     use nudge_core::grid::Window;
     use nudge_core::scene::CLASS_COUNT;
+    use nudge_core::world::TruthMap;
 
     #[test]
     fn precision_and_recall_of_a_hand_made_push() {
@@ -127,7 +125,7 @@ mod tests {
         after.labels[0] = 3;
         // Only a voxel up in the column of cell 5 differs.
         after.occupancy[grid.column(5).end - 1] = 1;
-        let changed = changed_cells(&grid, &before, &after);
+        let changed = before.changed_cells(&after);
         assert_eq!(changed, [true, false, false, false, false, true, false, false]);
         let window = Window { x: [0, 2], y: [0, 2] };
         let prediction = PushPrediction {
@@ -138,7 +136,11 @@ mod tests {
         };
         let predicted = predicted_cells(&grid, &prediction);
         assert_eq!(predicted, [true, true, false, false, false, false, false, false]);
-        let review = Review { of: (SessionId(0), 1), predicted: Some(2), changed: 2, both: 1 };
+        let surprise = prediction.surprise(&grid, &changed);
+        // Changed and expected to; not changed but rather expected to; half; unknown; outside: one that changed, and others.
+        let expected = [0.1_f32, 0.92, 0.69, 0.69, 0.0, 4.6, 0.0, 0.0];
+        assert!(surprise.iter().zip(expected).all(|(nats, expected)| (nats - expected).abs() < 0.01), "{surprise:?}");
+        let review = Review { of: (SessionId(0), 1), predicted: Some(2), changed: 2, both: 1, surprise_nats: None };
         assert_eq!((review.precision(), review.recall()), (Some(0.5), Some(0.5)));
         let blind = Review { predicted: None, both: 0, ..review };
         assert_eq!((blind.precision(), blind.recall()), (None, None));

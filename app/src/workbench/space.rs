@@ -357,48 +357,61 @@ impl Painter {
         }
     }
 
-    /// Beside what is believed now: predicted, the difference, and what happened.
+    /// Beside what is believed now: predicted, the difference, and what happened. Of the push that is looked at, else of the
+    /// one that led here.
     fn push_views(&mut self, side: &Side, space: &Space) {
-        let preview = space.preview.as_ref().filter(|preview| preview.of == side.key());
+        let asked = space.preview.as_ref().filter(|preview| preview.of == side.key());
+        let led_here = side.moment.outcome.as_deref().filter(|outcome| asked.is_none() && outcome.prediction.is_some());
         let now = self.full(side.key(), &side.moment.belief);
         let grid = now.grid;
-        if self.differs(at::PREDICTED, format!("{:?} {:?}", side.key(), preview.map(|preview| preview.push))) {
-            let swept = preview.map_or_else(Vec::new, |preview| {
+        if self.differs(at::PREDICTED, format!("{:?} {:?}", side.key(), asked.map(|preview| preview.push))) {
+            let swept = asked.map(|preview| &*preview.swept);
+            let swept = swept.or_else(|| led_here.and_then(|outcome| outcome.swept.as_ref()).map(|swept| &swept.swept));
+            let swept = swept.map_or_else(Vec::new, |swept| {
                 let mut inside = vec![false; grid.voxel_count()];
-                preview.swept.iter().for_each(|index| inside[index] = true);
+                swept.iter().for_each(|index| inside[index] = true);
                 surface(&grid, &inside)
             });
             self.log(at::SWEPT, &colored(&grid, &swept, |_| [120, 200, 255]).with_opacity(0.25));
-            let predicted = preview.map(|preview| {
-                let mut after = (*now).clone();
-                after.apply(&preview.prediction);
-                after
-            });
-            match &predicted {
+            let beliefs = match (asked, &side.before) {
+                (Some(preview), _) => {
+                    let mut after = (*now).clone();
+                    after.apply(&preview.prediction);
+                    Some((now.clone(), Arc::new(after)))
+                }
+                (None, Some(before)) if led_here.is_some() => {
+                    Some((self.full((side.id, before.step), &before.belief), now.clone()))
+                }
+                _ => None,
+            };
+            match beliefs {
                 None => {
                     self.log_voxels(at::PREDICTED, &grid, Vec::new(), |_| [0; 3]);
                     self.log_voxels(at::DIFFERENCE, &grid, Vec::new(), |_| [0; 3]);
                 }
-                Some(after) => {
+                Some((before, after)) => {
                     let truth = &side.moment.truth;
                     let plain = Display::default();
                     let (voxels, rgb) =
-                        Voxels { belief: after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
+                        Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
                     self.log_voxels(at::PREDICTED, &grid, voxels, rgb);
                     let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..plain };
                     let (voxels, rgb) =
-                        Voxels { belief: after, truth, catalog: &side.setup.catalog }.drawn(&changed, Some(&now));
+                        Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&changed, Some(&before));
                     self.log_voxels(at::DIFFERENCE, &grid, voxels, rgb);
                 }
             }
         }
-        let after = side.after.as_ref().filter(|after| {
-            after.outcome.as_ref().is_some_and(|outcome| matches!(outcome.record.action, Action::Push(_)))
-        });
-        if self.differs(at::HAPPENED, format!("{:?} {}", side.key(), after.is_some())) {
-            let truth = after.map_or(&side.moment.truth, |after| &after.truth);
+        let pushed = |moment: &&Arc<Moment>| {
+            let action = moment.outcome.as_ref().map(|outcome| outcome.record.action);
+            matches!(action, Some(Action::Push(_)))
+        };
+        let here = Some(&side.moment).filter(|_| asked.is_none());
+        let pushed = side.after.as_ref().filter(pushed).or_else(|| here.filter(pushed));
+        if self.differs(at::HAPPENED, format!("{:?} {:?}", side.key(), pushed.map(|moment| moment.step))) {
+            let truth = pushed.map_or(&side.moment.truth, |pushed| &pushed.truth);
             let inside: Vec<bool> = truth.occupancy.iter().map(|o| *o == 1).collect();
-            let voxels = if after.is_some() { surface(&grid, &inside) } else { Vec::new() };
+            let voxels = if pushed.is_some() { surface(&grid, &inside) } else { Vec::new() };
             let catalog = &side.setup.catalog;
             self.log_voxels(at::HAPPENED, &grid, voxels, |index| {
                 colors::of_class(catalog, ClassId(truth.labels[index / grid.dims[2]]))

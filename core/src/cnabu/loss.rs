@@ -53,8 +53,23 @@ fn beta_kl(z: &Tensor) -> Tensor {
     z.softplus() - z.sigmoid()
 }
 
+/// The mean of a loss, weighted where there are weights; they broadcast to it and have a mean of 1.
+fn mean(loss: &Tensor, weights: Option<&Tensor>) -> Tensor {
+    match weights {
+        Some(weights) => (loss * weights).mean(loss.kind()),
+        None => loss.mean(loss.kind()),
+    }
+}
+
 /// Mean loss of Beta evidence: `z_occupied` and `z_free` against the share `y` of occupied, all of one shape.
-pub fn occupancy_loss(z_occupied: &Tensor, z_free: &Tensor, y: &Tensor, form: LossForm, kl_weight: f64) -> Tensor {
+pub fn occupancy_loss(
+    z_occupied: &Tensor,
+    z_free: &Tensor,
+    y: &Tensor,
+    form: LossForm,
+    kl_weight: f64,
+    weights: Option<&Tensor>,
+) -> Tensor {
     let (log_occupied, log_free) = (z_occupied.softplus(), z_free.softplus());
     let likelihood = match form {
         // ln S - ln a_free - y (ln a_occ - ln a_free)
@@ -65,18 +80,25 @@ pub fn occupancy_loss(z_occupied: &Tensor, z_free: &Tensor, y: &Tensor, form: Lo
             (occupied + free).digamma() - &psi_free - y * (psi_occupied - &psi_free)
         }
     };
-    let mut loss = likelihood.mean(likelihood.kind());
+    let mut loss = mean(&likelihood, weights);
     if kl_weight > 0.0 {
         // Where it is occupied the evidence for free is wrong, and the other way round.
         let (wrong_free, wrong_occupied) = (beta_kl(z_free), beta_kl(z_occupied));
         let kl = &wrong_occupied + y * (wrong_free - &wrong_occupied);
-        loss += kl.mean(kl.kind()) * kl_weight;
+        loss += mean(&kl, weights) * kl_weight;
     }
     loss
 }
 
-/// Mean loss of Dirichlet evidence: `z` of shape `[B, K, ...]` against class numbers of shape `[B, 1, ...]`.
-pub fn semantics_loss(z: &Tensor, classes: &Tensor, form: LossForm, kl_weight: f64) -> Tensor {
+/// Mean loss of Dirichlet evidence: `z` of shape `[B, K, ...]` against class numbers of shape `[B, 1, ...]`; weights are of
+/// the latter shape.
+pub fn semantics_loss(
+    z: &Tensor,
+    classes: &Tensor,
+    form: LossForm,
+    kl_weight: f64,
+    weights: Option<&Tensor>,
+) -> Tensor {
     let a = z.exp() + 1.0;
     let sum = a.sum_dim_intlist(1, true, a.kind());
     let right = a.gather(1, classes, false);
@@ -84,7 +106,7 @@ pub fn semantics_loss(z: &Tensor, classes: &Tensor, form: LossForm, kl_weight: f
         LossForm::Marginal => sum.log() - right.log(),
         LossForm::Expected => sum.digamma() - right.digamma(),
     };
-    let mut loss = likelihood.mean(likelihood.kind());
+    let mut loss = mean(&likelihood, weights);
     if kl_weight > 0.0 {
         let wrong = a.scatter_value(1, classes, 1.0);
         let kl = kl_to_uniform(&wrong, 1);
@@ -131,11 +153,11 @@ mod tests {
         assert_near(&marginal_log_loss(&a, &y, 1), &MARGINAL);
         assert_near(&kl_to_uniform(&a, 1), &KL);
         let (occupied, free, y) = z_occupancy();
-        let loss = |form| occupancy_loss(&occupied, &free, &y, form, KL_WEIGHT);
+        let loss = |form| occupancy_loss(&occupied, &free, &y, form, KL_WEIGHT, None);
         assert_near(&loss(LossForm::Expected), &[0.854_338_646_734_955_5]);
         assert_near(&loss(LossForm::Marginal), &[0.766_844_401_892_764_4]);
         let (z, classes) = z_semantics();
-        let loss = |form| semantics_loss(&z, &classes, form, KL_WEIGHT);
+        let loss = |form| semantics_loss(&z, &classes, form, KL_WEIGHT, None);
         assert_near(&loss(LossForm::Expected), &[2.679_744_267_940_27]);
         assert_near(&loss(LossForm::Marginal), &[2.503_968_462_868_297]);
     }
@@ -164,12 +186,28 @@ mod tests {
         let (occupied, free, y) = z_occupancy();
         let (z, classes) = z_semantics();
         for form in [LossForm::Expected, LossForm::Marginal] {
-            assert_gradient(&occupied, &|z| occupancy_loss(z, &free, &y, form, KL_WEIGHT));
-            assert_gradient(&free, &|z| occupancy_loss(&occupied, z, &y, form, KL_WEIGHT));
-            assert_gradient(&z, &|z| semantics_loss(z, &classes, form, KL_WEIGHT));
+            assert_gradient(&occupied, &|z| occupancy_loss(z, &free, &y, form, KL_WEIGHT, None));
+            assert_gradient(&free, &|z| occupancy_loss(&occupied, z, &y, form, KL_WEIGHT, None));
+            assert_gradient(&z, &|z| semantics_loss(z, &classes, form, KL_WEIGHT, None));
         }
         let a = Tensor::from_slice(&PARAMETERS).reshape([3, 3]);
         assert_gradient(&a, &|a| kl_to_uniform(a, 1).sum(Kind::Double));
+    }
+
+    #[test]
+    fn weights_choose_what_the_mean_is_of() {
+        let (occupied, free, y) = z_occupancy();
+        let half = |t: &Tensor| t.narrow(0, 0, 2);
+        let weights = Tensor::from_slice(&[2.0, 2.0, 0.0, 0.0]);
+        let loss = |weights| occupancy_loss(&occupied, &free, &y, LossForm::Marginal, KL_WEIGHT, weights);
+        let first = occupancy_loss(&half(&occupied), &half(&free), &half(&y), LossForm::Marginal, KL_WEIGHT, None);
+        assert_near(&loss(Some(&weights)), &[first.double_value(&[])]);
+        assert_near(&loss(Some(&weights.ones_like())), &[loss(None).double_value(&[])]);
+        let (z, classes) = z_semantics();
+        let weights = Tensor::from_slice(&[0.0, 3.0, 0.0]).reshape([1, 1, 3]);
+        let loss = semantics_loss(&z, &classes, LossForm::Marginal, 0.0, Some(&weights));
+        let one = semantics_loss(&z.narrow(2, 1, 1), &classes.narrow(2, 1, 1), LossForm::Marginal, 0.0, None);
+        assert_near(&loss, &[one.double_value(&[])]);
     }
 
     #[test]
@@ -187,12 +225,12 @@ mod tests {
         let loss = |mean: f64| {
             let (occupied, free) = (100.0 * mean - 1.0, 100.0 * (1.0 - mean) - 1.0);
             let z = |e: f64| Tensor::full([10], e.ln(), (Kind::Double, tch::Device::Cpu));
-            occupancy_loss(&z(occupied), &z(free), &y, LossForm::Marginal, 0.0).double_value(&[])
+            occupancy_loss(&z(occupied), &z(free), &y, LossForm::Marginal, 0.0, None).double_value(&[])
         };
         assert!(loss(0.7) < loss(0.65) && loss(0.7) < loss(0.75));
         let wrong = |z: f64, kl: f64| {
             let of = |z: f64| Tensor::from_slice(&[z]);
-            occupancy_loss(&of(-20.0), &of(z), &of(1.0), LossForm::Marginal, kl).double_value(&[])
+            occupancy_loss(&of(-20.0), &of(z), &of(1.0), LossForm::Marginal, kl, None).double_value(&[])
         };
         assert!(wrong(3.0, 1.0) - wrong(3.0, 0.0) > 1.0 && wrong(-20.0, 1.0) - wrong(-20.0, 0.0) < 1e-6);
     }

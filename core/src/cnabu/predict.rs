@@ -132,14 +132,24 @@ impl Planes {
             prediction.occupancy.extend(before.iter().enumerate().map(|(z, a)| {
                 let level = (z / VOXELS_PER_LEVEL).min(LEVELS - 1);
                 let after = |side: usize| occupancy[((side * LEVELS + level) * SUBS + sub) * plane + pixel];
-                [(1.0 - p) * a[0] + p * after(0), (1.0 - p) * a[1] + p * after(1)]
+                gated(a, &[after(0), after(1)], p)
             }));
-            prediction.semantics.push(std::array::from_fn::<f32, CLASS_COUNT, _>(|k| {
-                (1.0 - p) * labels[k] + p * semantics[(k * SUBS + sub) * plane + pixel]
-            }));
+            let after: [f32; CLASS_COUNT] = std::array::from_fn(|k| semantics[(k * SUBS + sub) * plane + pixel]);
+            prediction.semantics.push(gated(labels, &after, p));
         }
         prediction
     }
+}
+
+/// What is believed when with probability `p` a cell changes, and then has evidence `after`, and else keeps its evidence.
+///
+/// The means are mixed, `P = (1 - p) P_kept + p P_changed`, and so are the epistemic uncertainties `K / sum(a)`. (Mixing
+/// the evidence itself, `(1 - p) a + p a_changed`, would let what was once well known drown a prediction that is
+/// honestly unsure, however probable the change.)
+fn gated<const K: usize>(kept: &[f32; K], after: &[f32; K], p: f32) -> [f32; K] {
+    let sums = [kept, after].map(|a| a.iter().sum::<f32>());
+    let sum = 1.0 / ((1.0 - p) / sums[0] + p / sums[1]);
+    std::array::from_fn(|k| sum * ((1.0 - p) * kept[k] / sums[0] + p * after[k] / sums[1]))
 }
 
 /// The smallest window within `reach` that holds every cell with a chance of change; one cell when there is none.
@@ -156,4 +166,24 @@ fn tight(reach: Window, layout: &Layout, chance: &impl Fn(usize) -> f32) -> Wind
         return Window { x: [reach.x[0], reach.x[0] + 1], y: [reach.y[0], reach.y[0] + 1] };
     }
     Window { x: [low[0], high[0]], y: [low[1], high[1]] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::gated;
+
+    #[test]
+    fn a_gate_mixes_probabilities_and_not_evidence() {
+        let (kept, after) = ([98.0, 2.0], [1.0, 3.0]);
+        let mean = |a: [f32; 2]| a[0] / (a[0] + a[1]);
+        for p in [0.0, 0.3, 0.9, 1.0] {
+            let posterior = gated(&kept, &after, p);
+            assert!((mean(posterior) - ((1.0 - p) * 0.98 + p * 0.25)).abs() < 1e-5, "{p}: {posterior:?}");
+        }
+        let close = |a: [f32; 2], b: [f32; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3);
+        assert!(close(gated(&kept, &after, 0.0), kept) && close(gated(&kept, &after, 1.0), after));
+        // Half and half is little better known than the worse known of the two.
+        let sum: f32 = gated(&kept, &after, 0.5).iter().sum();
+        assert!((sum - 1.0 / (0.5 / 100.0 + 0.5 / 4.0)).abs() < 1e-3, "{sum}");
+    }
 }

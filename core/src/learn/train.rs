@@ -216,9 +216,9 @@ impl Trainer {
             let levels = z_occupancy.size()[1] / 2;
             let part = |first: i64| strided(&z_occupancy.narrow(1, first, levels), 2, quarter);
             let occupancy =
-                occupancy_loss(&part(0), &part(levels), &strided(&truth, 2, quarter), LossForm::Marginal, kl);
+                occupancy_loss(&part(0), &part(levels), &strided(&truth, 2, quarter), LossForm::Marginal, kl, None);
             let z_classes = z_semantics.view([self.settings.batch as i64, CLASS_COUNT as i64, -1, x, y]);
-            let semantics = semantics_loss(&z_classes, &classes, LossForm::Marginal, 0.0);
+            let semantics = semantics_loss(&z_classes, &classes, LossForm::Marginal, 0.0, None);
             let mut loss = &occupancy + &semantics * self.settings.semantic_weight;
             if kl > 0.0 {
                 let few = strided(&z_classes, 4, sixteenth).exp() + 1.0;

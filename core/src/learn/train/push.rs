@@ -1,6 +1,6 @@
 //! Training sigma_m: the frozen sigma_o over a sample's views gives the belief, then each of its pushes is to be predicted.
 //!
-//! The loss is that of occupancy and semantics after the push, plus that of the change mask (does anything of a floor cell
+//! The loss is that of occupancy and semantics after the push, mostly of the cells that it changes, plus that of the change mask (does anything of a floor cell
 //! change, voxels or label), plus a small consistency term: where nothing changes the evidence is to stay as it was
 //! (squared difference of the logarithms).
 
@@ -25,6 +25,9 @@ use tch::{Device, Kind, Tensor};
 const SUBS: usize = 4;
 /// Memory for beliefs that are kept, bytes.
 const BELIEFS_BYTES: usize = 6 << 30;
+/// How much a floor cell that does not change counts beside one that does: the posterior is gated with the probability of
+/// change, so what is wanted is the prediction given that the cell changes.
+const UNCHANGED: f64 = 0.1;
 /// Weight of the consistency term.
 const CONSISTENCY: f64 = 0.01;
 
@@ -185,13 +188,27 @@ impl PushTrainer {
         let at = [rng.random_range(0..2), rng.random_range(0..2)];
         let quarter = |t: &Tensor| t.slice(2, at[0], None, 2).slice(3, at[1], None, 2);
         let levels = pushed.occupancy.size()[1] / 2;
-        let side = |first: i64| quarter(&pushed.occupancy.narrow(1, first, levels));
-        let occupancy = occupancy_loss(&side(0), &side(levels), &quarter(&to.truth), LossForm::Marginal, kl);
+        let weights = (&to.changed + UNCHANGED) / (to.changed.mean(Kind::Float) + UNCHANGED);
+        // `[B, 1, sub-cells, ...]`, so that it goes with levels and with classes.
+        let weights = weights.unsqueeze(1);
+        let by_level = |t: Tensor| {
+            let size = t.size();
+            t.view([size[0], -1, SUBS as i64, size[2], size[3]])
+        };
+        let side = |first: i64| by_level(quarter(&pushed.occupancy.narrow(1, first, levels)));
+        let occupancy = occupancy_loss(
+            &side(0),
+            &side(levels),
+            &by_level(quarter(&to.truth)),
+            LossForm::Marginal,
+            kl,
+            Some(&weights.slice(3, at[0], None, 2).slice(4, at[1], None, 2)),
+        );
         let size = pushed.semantics.size();
         let z = pushed.semantics.view([size[0], CLASS_COUNT as i64, SUBS as i64, size[2], size[3]]);
-        let semantics = semantics_loss(&z, &to.classes, LossForm::Marginal, 0.0);
+        let semantics = semantics_loss(&z, &to.classes, LossForm::Marginal, 0.0, Some(&weights));
         let half = |first: usize| pushed.change.narrow(1, (first * SUBS) as i64, SUBS as i64);
-        let change = occupancy_loss(&half(0), &half(1), &to.changed, LossForm::Marginal, kl);
+        let change = occupancy_loss(&half(0), &half(1), &to.changed, LossForm::Marginal, kl, None);
 
         let unchanged = (quarter(&to.changed) * -1.0 + 1.0).unsqueeze(1);
         let drift = quarter(&pushed.occupancy).softplus() - quarter(&prior.occupancy);

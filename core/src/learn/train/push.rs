@@ -244,11 +244,13 @@ impl Beliefs {
         }
         let half = evidence.to_kind(Kind::Half);
         let bytes = 2 * (half.occupancy.numel() + half.semantics.numel());
+        // Rounded now as later: a run that is resumed is the run that was not stopped.
+        let rounded = half.to_kind(Kind::Float);
         if self.bytes + bytes <= BELIEFS_BYTES {
             self.bytes += bytes;
             self.kept.insert(number, half);
         }
-        evidence
+        rounded
     }
 }
 

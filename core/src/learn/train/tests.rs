@@ -199,9 +199,9 @@ fn sigma_m_learns_what_a_push_does_and_predicts_inside_its_window() {
         assert!(prediction.occupancy.as_flattened().iter().all(|a| a.is_finite() && *a >= 1.0));
         let middle = push.push.start_point() + push.push.direction() * (0.5 * push.push.length_m);
         let cell = data.grid().cell_at(middle).expect("on the board");
-        let reach = 41;
-        let x = usize::from(cell.x);
-        assert!(window.x[0] + reach > x && window.x[1] <= x + reach, "{window:?} around {x}");
+        // 80 cells around the push, moved in from the walls.
+        let first = usize::from(cell.x).clamp(40, data.grid().dims[0] - 40) - 40;
+        assert!(window.x[0] + 1 >= first && window.x[1] <= first + 81, "{window:?} around {}", cell.x);
         let mut after = belief.clone();
         after.apply(prediction);
         for (at, cell) in window.cells(&data.grid()).enumerate() {

@@ -11,7 +11,8 @@ mod stage;
 
 pub use floor::{
     CellError, FloorPlan, believed_class, cell_entropy, cell_error, cell_errors, column_entropy, entropy_range,
-    outlines, paint, paint_certainty, paint_entropy, paint_errors, paint_labels, paint_semantics, semantics_rgb,
+    outlines, paint, paint_certainty, paint_entropy, paint_errors, paint_labels, paint_semantics, paint_surprise,
+    semantics_rgb,
 };
 pub use image::RgbImage;
 pub use light::{Eye, Item, Projection, render};

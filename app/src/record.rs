@@ -154,7 +154,7 @@ impl Recorder {
             .map(|(predicted, before)| predicted.surprise(&state.belief.grid, &before.changed_cells(state.truth)));
         self.robot(setting, state.step, outcome)?;
         self.state(setting, state)?;
-        let surprise = surprise.map(|surprise| floor::surprise(&state.belief.grid, &surprise));
+        let surprise = surprise.map(|surprise| floor::picture(&picture::paint_surprise(&state.belief.grid, &surprise)));
         self.log_or_clear(paths::PREDICTED_SURPRISE, surprise)?;
         match outcome {
             Some(outcome) => self.outcome(setting, state.belief, outcome, &nats)?,

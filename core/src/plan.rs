@@ -13,8 +13,7 @@ pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, QUIET_STEPS, SATURATION, look_or_push, push_guard, saturated};
 pub use weigh::{COARSE_VIEWS, disturbance};
 
-use crate::arm::Push;
-use crate::arm::{ArmTool, PushMotion};
+use crate::arm::{ArmTool, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CERTAIN, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::gain::GainField;

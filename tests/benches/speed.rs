@@ -2,8 +2,7 @@
 //!
 //! Each figure is the median of a few runs on this machine as it is; a target is for two idle cores.
 
-use nudge_core::arm::Push;
-use nudge_core::arm::{ArmTool, PushMotion};
+use nudge_core::arm::{ArmTool, Push, PushMotion};
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, ViewId, project, render};
 use nudge_core::episode::{Episode, EpisodeConfig};

@@ -2,7 +2,7 @@
 
 use crate::colors::{self, Colormap, Rgb};
 use image::RgbImage;
-use nudge_core::belief::{self, Belief};
+use nudge_core::belief::{self, Belief, MOST_SURPRISING};
 use nudge_core::grid::Grid;
 use nudge_core::scene::{BACKGROUND, CLASS_COUNT, Catalog, ClassId};
 use nudge_core::score::SCORED_HEIGHT_M;
@@ -117,6 +117,11 @@ pub fn entropy_range(grid: &Grid) -> [f32; 2] {
 pub fn paint_entropy(belief: &Belief) -> RgbImage {
     let (entropy, range) = (cell_entropy(belief), entropy_range(&belief.grid));
     paint(&belief.grid, |cell| Colormap::Magma.of(entropy[cell], range))
+}
+
+/// Surprise per cell, 0 to [`MOST_SURPRISING`] nats, in magma.
+pub fn paint_surprise(grid: &Grid, surprise: &[f32]) -> RgbImage {
+    paint(grid, |cell| Colormap::Magma.of(surprise[cell], [0.0, MOST_SURPRISING]))
 }
 
 /// How a cell's likeliest class compares with the truth.

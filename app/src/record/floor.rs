@@ -84,11 +84,6 @@ pub fn predicted_change(grid: &Grid, prediction: &PushPrediction) -> rerun::Imag
     picture(&picture::paint(grid, |cell| Colormap::Viridis.rgb(change[cell])))
 }
 
-/// Surprise per cell, 0 to [`MOST_SURPRISING`] nats (magma).
-pub fn surprise(grid: &Grid, surprise: &[f32]) -> rerun::Image {
-    picture(&picture::paint(grid, |cell| Colormap::Magma.rgb(surprise[cell] / MOST_SURPRISING)))
-}
-
 /// The true objects' outlines over a floor map.
 pub fn outlines(truth: &TruthMap) -> rerun::LineStrips2D {
     let runs = picture::outlines(truth).into_iter().map(|run| run.map(|[x, y]| [x as f32, y as f32]));

@@ -3,8 +3,7 @@
 use super::record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
-use crate::arm::Push;
-use crate::arm::{Arm, ArmTool, HandPose, Motion, PushMotion};
+use crate::arm::{Arm, ArmTool, HandPose, Motion, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet};

@@ -119,7 +119,7 @@ impl GainField {
                 for (z, (code, beta)) in field.codes[column..column + height].iter_mut().zip(betas).enumerate() {
                     let new = quantiser.code(beta_mean(*beta));
                     if let Some(seen) = seen.as_mut().map(|seen| &mut seen[column + z])
-                        && (*seen >= 1.0 && chance > 0.0 && is_informative(new))
+                        && (*seen >= OWING && chance > 0.0 && is_informative(new))
                     {
                         *seen = OWING + chance;
                         VoxelBox::add(&mut changed, [x, y, z]);

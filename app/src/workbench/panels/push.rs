@@ -370,7 +370,7 @@ impl Here<'_> {
         let (grid, ctx) = (self.grid, ui.ctx().clone());
         let picture = state.textures.get(&ctx, (self.session.id, self.step, Shown::Surprise), || {
             let surprise = prediction.surprise(&grid, &before.truth.changed_cells(&after.truth));
-            textures::of_rgb(&picture::paint(&grid, |cell| Colormap::Magma.rgb(surprise[cell] / MOST_SURPRISING)))
+            textures::of_rgb(&picture::paint_surprise(&grid, &surprise))
         });
         let outlines = state.outlines_after.of(&after.bodies);
         heading(ui, "Surprise", "How improbable the prediction held what happened to each floor cell");

@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
+use nudge_core::plan::{Counted, PlannerSettings};
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
@@ -137,4 +138,10 @@ fn no_networks() -> nudge_core::Error {
 /// Tells of something on standard error that does not stop the work.
 fn warn(message: &str) {
     eprintln!("warning: {message}");
+}
+
+/// The planner's settings of a run: the way to count that was asked for, or the one that serves the belief best.
+fn planner(gain: Option<Counted>, belief: &str, candidates: usize) -> PlannerSettings {
+    let settings = PlannerSettings { candidates, ..PlannerSettings::default() };
+    settings.counting(gain.unwrap_or_else(|| Counted::of_belief(belief)))
 }

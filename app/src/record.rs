@@ -55,6 +55,8 @@ pub struct Setting<'a> {
     pub budget: usize,
     /// Weight of the disturbance term.
     pub gamma: f32,
+    /// How many times what looking does a push has to promise.
+    pub patience: f32,
     /// The arm before the shelf, where there is one to show.
     pub arm: &'a ArmTool,
     /// Views that its hand cannot be at.
@@ -432,6 +434,7 @@ fn setting(episode: &Episode) -> Setting<'_> {
         views: episode.views(),
         budget: record.config.budget,
         gamma: record.config.planner.gamma,
+        patience: record.config.planner.patience,
         arm: episode.arm(),
         unreachable: episode.unreachable_views(),
     }

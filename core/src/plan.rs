@@ -10,7 +10,9 @@ mod weigh;
 
 pub use decide::decide;
 pub use policy::PolicyKind;
-pub use rule::{PUSH_EVERY, QUIET_STEPS, SATURATION, look_or_push, push_guard, saturated};
+pub use rule::{
+    CLOSING_STEPS, PATIENCE, PUSH_EVERY, QUIET_STEPS, RESTORING_STEPS, SATURATION, look_or_push, push_guard, saturated,
+};
 pub use weigh::{COARSE_VIEWS, disturbance};
 
 use crate::arm::{ArmTool, Push, PushMotion};
@@ -49,7 +51,7 @@ pub enum Reason {
     ViewOfPush,
     /// No push in the first three steps.
     TooEarly,
-    /// No push in the last step.
+    /// No push in the last step, or steps.
     LastStep,
     /// No push right after a push.
     JustPushed,
@@ -205,13 +207,19 @@ pub enum Counted {
     #[default]
     All,
     /// Those that no look has seen yet, or not since a push may have changed them. What a push would make uncertain of
-    /// what was seen counts against it.
+    /// what was seen is no gain.
     Unseen,
 }
 
 impl Counted {
     /// Both.
     pub const ALL: [Self; 2] = [Self::All, Self::Unseen];
+
+    /// What serves a belief best, by the belief update's name: the networks stay unsure of edges however often they are
+    /// looked at, so there only unseen voxels count.
+    pub fn of_belief(name: &str) -> Self {
+        if name == "cnabu" { Self::Unseen } else { Self::All }
+    }
 }
 
 impl std::fmt::Display for Counted {
@@ -250,12 +258,16 @@ pub struct PlannerSettings {
     pub candidates: usize,
     /// Weight of the disturbance term.
     pub gamma: f32,
+    /// A push has to promise this many times what looking does: look if `patience IGV > IGM + gamma Reg`.
+    pub patience: f32,
     /// A floor cell whose likeliest class is more probable than this is certain.
     pub certain: f32,
     /// The map is complete, and nothing is pushed any more, once this share of the floor cells is certain.
     pub complete: f32,
     /// The first steps, in which nothing is pushed.
     pub quiet_steps: usize,
+    /// The last steps, in which nothing is pushed: looks that make good what a push disturbs.
+    pub closing_steps: usize,
     /// The policy `saturation` pushes once two consecutive best gains differ by less than this share.
     pub saturation: f32,
 }
@@ -266,14 +278,28 @@ impl Default for PlannerSettings {
             counted: Counted::default(),
             candidates: 80,
             gamma: GAMMA,
+            patience: 1.0,
             certain: CERTAIN,
             complete: COMPLETE_SHARE,
             quiet_steps: QUIET_STEPS,
+            closing_steps: CLOSING_STEPS,
             saturation: SATURATION,
         }
     }
 }
 
-#[cfg(test)]
+impl PlannerSettings {
+    /// These settings with what goes with a way to count: the paper's rule where all voxels count. Where only unseen ones
+    /// do, a push has to promise [`PATIENCE`] times what looking does, and the last [`RESTORING_STEPS`] steps look: a push
+    /// takes about that many looks to pay off.
+    pub fn counting(self, counted: Counted) -> Self {
+        let (patience, closing_steps) = match counted {
+            Counted::All => (1.0, CLOSING_STEPS),
+            Counted::Unseen => (PATIENCE, RESTORING_STEPS),
+        };
+        Self { counted, patience, closing_steps, ..self }
+    }
+}
+
 #[cfg(test)]
 mod tests;

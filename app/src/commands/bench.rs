@@ -63,9 +63,10 @@ struct RunArgs {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
-    /// Which voxels a view's gain counts: all that it may see, or those that no look has seen yet
-    #[arg(long, value_name = "all|unseen", default_value_t = Counted::default())]
-    gain: Counted,
+    /// Which voxels a view's gain counts: all that it may see, with the paper's rule, or those that no look has seen yet
+    /// (default: unseen with the cnabu belief, else all)
+    #[arg(long, value_name = "all|unseen")]
+    gain: Option<Counted>,
     /// Push candidates drawn per decision
     #[arg(long, default_value_t = PlannerSettings::default().candidates)]
     candidates: usize,
@@ -143,6 +144,8 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     if args.budget == 0 {
         return Err(Error::Usage("--budget must be at least one action".to_owned()).into());
     }
+    // One setting for the whole bench, so that its policies compare.
+    let belief = if policies.iter().any(|plan| plan.belief == "cnabu") { "cnabu" } else { "classical" };
     let (sets, broken) = load_sets(&args.sets, &Catalog::standard())?;
     nudge_core::camera::ViewArray::named(&args.views)?;
     Ok(Plan {
@@ -151,7 +154,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         budget: args.budget,
         seeds: args.seeds,
         views: args.views.clone(),
-        planner: PlannerSettings { counted: args.gain, candidates: args.candidates, ..PlannerSettings::default() },
+        planner: super::planner(args.gain, belief, args.candidates),
         policies,
         sets,
         broken,

@@ -33,9 +33,10 @@ pub struct Args {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
-    /// Which voxels a view's gain counts: all that it may see, or those that no look has seen yet
-    #[arg(long, value_name = "all|unseen", default_value_t = Counted::default())]
-    gain: Counted,
+    /// Which voxels a view's gain counts: all that it may see, with the paper's rule, or those that no look has seen yet
+    /// (default: unseen with the cnabu belief, else all)
+    #[arg(long, value_name = "all|unseen")]
+    gain: Option<Counted>,
     /// Push candidates drawn per decision
     #[arg(long, default_value_t = PlannerSettings::default().candidates)]
     candidates: usize,
@@ -71,7 +72,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.seed,
         budget: args.budget,
         views: args.views.clone(),
-        planner: PlannerSettings { counted: args.gain, candidates: args.candidates, ..PlannerSettings::default() },
+        planner: super::planner(args.gain, update.name(), args.candidates),
         noise: None,
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));

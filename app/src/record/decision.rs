@@ -101,7 +101,7 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
         action(&record.action),
         capital(reason(decision.reason))
     );
-    weighed(&mut page, decision, setting.gamma);
+    weighed(&mut page, decision, setting);
     views(&mut page, setting, decision);
     pushes(&mut page, decision, setting.gamma);
     let scores = &record.scores;
@@ -117,13 +117,17 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     page
 }
 
-fn weighed(page: &mut String, decision: &Decision, gamma: f32) {
+fn weighed(page: &mut String, decision: &Decision, setting: &Setting<'_>) {
+    let (gamma, patience) = (setting.gamma, setting.patience);
     let sign = |holds: bool| if holds { " ◀" } else { "" };
     let push = decision.igm + gamma * decision.reg;
     let (looks, pushed) = (matches!(decision.action, Action::Look { .. }), decision.best_push.is_some());
     page.push_str("| weighed | nats |\n|:--|--:|\n");
     let _ = writeln!(page, "| look: IGV, the best two views{} | {:.1} |", sign(looks), decision.igv);
     if pushed {
+        if patience != 1.0 {
+            let _ = writeln!(page, "|    patience·IGV, what a push has to promise | {:.1} |", patience * decision.igv);
+        }
         let _ = writeln!(page, "| push: IGM + γ·Reg{} | {push:.1} |", sign(!looks));
         let _ = writeln!(page, "|    IGM, the best view after the best push | {:.1} |", decision.igm);
         let _ = writeln!(page, "|    γ·Reg, what it would blur | {:.1} |", gamma * decision.reg);

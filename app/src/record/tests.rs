@@ -26,6 +26,7 @@ fn a_recording_stays_small_and_names_its_entities() {
         views: &played.views,
         budget: steps,
         gamma: 0.2,
+        patience: 1.0,
         arm: &arm,
         unreachable: &[],
     };

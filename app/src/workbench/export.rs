@@ -122,6 +122,7 @@ fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Wa
         views: &session.setup.views,
         budget: record.config.budget,
         gamma: record.config.planner.gamma,
+        patience: record.config.planner.patience,
     };
     let mut recorder = Recorder::begin(path, &record::title(record), &setting)?;
     for (done, moment) in session.moments.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! A belief's occupancy prepared for walking rays.
 
-use super::code::{OPAQUE, Quantiser, is_informative};
+use super::code::{OPAQUE, Quantiser};
 use super::{RayDensity, arrivals, skip};
 use crate::belief::{Belief, PushPrediction, beta_mean};
 use crate::camera::{ViewArray, ViewId};
@@ -11,9 +11,6 @@ use std::sync::Arc;
 /// The most voxels along one axis that fixed-point rays can count.
 const MOST_VOXELS: usize = 2_000;
 
-/// What marks a seen voxel that a push owes: more than any transmittance.
-const OWING: f32 = 1.0;
-
 /// A belief's occupancy prepared for walking rays: 8-bit probabilities in a padded grid, transparent voxels with the
 /// room ahead of them.
 #[derive(Clone)]
@@ -21,8 +18,7 @@ pub struct GainField {
     pub(super) layout: Layout,
     /// Code per voxel of the padded grid.
     pub(super) codes: Vec<u8>,
-    /// Transmittance with which an earlier view arrived, per voxel of the padded grid; above [`OWING`] for voxels that were
-    /// seen and that a predicted push makes uncertain, by the probability that it does.
+    /// Transmittance with which an earlier view arrived, per voxel of the padded grid.
     pub(super) seen: Option<Arc<Vec<f32>>>,
 }
 
@@ -54,9 +50,8 @@ impl GainField {
         &self.layout.grid
     }
 
-    /// This field with a push's predicted window in place of what stands there. A voxel that was seen and that the push
-    /// changes with probability `c` owes `c` times its predicted entropy: that is what the push makes uncertain, and what
-    /// looking again only restores.
+    /// This field with a push's predicted window in place of what stands there. Voxels that were seen inform no more
+    /// after the push than before: what it makes uncertain of them, looking again only restores.
     pub fn with_prediction(&self, prediction: &PushPrediction) -> Self {
         self.patched(prediction).0
     }
@@ -91,13 +86,11 @@ impl GainField {
         Self { layout: self.layout, codes: self.codes.clone(), seen: Some(Arc::new(arrival)) }
     }
 
-    /// What of a ray's transmittance at a voxel tells something that no earlier view saw; negative where a push owes what
-    /// was seen.
+    /// What of a ray's transmittance at a voxel tells something that no earlier view saw.
     #[inline(always)]
     pub(super) fn unseen_share(&self, index: usize, transmittance: f32) -> f32 {
         match &self.seen {
             None => transmittance,
-            Some(seen) if seen[index] > OWING => transmittance * (OWING - seen[index]),
             Some(seen) => (transmittance - seen[index]).max(0.0),
         }
     }
@@ -105,8 +98,6 @@ impl GainField {
     /// This field with a prediction, and the box of the voxels that changed in it.
     pub(super) fn patched(&self, prediction: &PushPrediction) -> (Self, Option<VoxelBox>) {
         let mut field = self.clone();
-        let mut seen = field.seen.as_mut().map(Arc::make_mut);
-        let mut chances = prediction.change.iter();
         let window = prediction.window;
         let height = self.layout.grid.dims[2];
         let quantiser = Quantiser::get();
@@ -115,15 +106,8 @@ impl GainField {
         for x in window.x[0]..window.x[1] {
             for (y, betas) in (window.y[0]..window.y[1]).zip(predicted.by_ref()) {
                 let column = self.layout.at([x, y, 0]);
-                let chance = chances.next().copied().unwrap_or(0.0);
                 for (z, (code, beta)) in field.codes[column..column + height].iter_mut().zip(betas).enumerate() {
                     let new = quantiser.code(beta_mean(*beta));
-                    if let Some(seen) = seen.as_mut().map(|seen| &mut seen[column + z])
-                        && (*seen >= OWING && chance > 0.0 && is_informative(new))
-                    {
-                        *seen = OWING + chance;
-                        VoxelBox::add(&mut changed, [x, y, z]);
-                    }
                     let (was_clear, is_clear) = (skip::is_transparent(*code), new == 0);
                     if was_clear && is_clear || *code == new {
                         continue;

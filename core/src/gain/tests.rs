@@ -4,7 +4,9 @@ mod change;
 mod support;
 
 use super::*;
-use crate::belief::{Belief, bernoulli_entropy};
+use crate::belief::{Belief, PushPrediction, bernoulli_entropy};
+use crate::grid::{VoxelSet, Window};
+use crate::scene::CLASS_COUNT;
 use proptest::prelude::*;
 use support::{exactly, facing, patchy, slow_gain, small_grid, standard};
 
@@ -45,6 +47,25 @@ fn sure_voxels_carry_no_information_and_block_or_pass_wholly() {
     // The bounds themselves are not sure.
     assert!(gain_of_row(&[0.05, 0.01, 0.01]) > 0.19);
     assert!(gain_of_row(&[0.95, 0.5, 0.5]) > 0.19);
+}
+
+#[test]
+fn what_a_push_blurs_of_what_was_seen_is_no_gain_but_blocks() {
+    let (belief, array) = row(&[0.01, 0.5]);
+    let mut seen = VoxelSet::empty(&belief.grid);
+    seen.insert(0);
+    let prediction = PushPrediction {
+        window: Window { x: [0, 1], y: [0, 1] },
+        occupancy: vec![[1.0, 1.0]],
+        semantics: vec![[1.0; CLASS_COUNT]],
+        change: vec![1.0],
+    };
+    let gain = |field: &GainField| gain_of_views(field, &array, &[ViewId(0)], RayDensity { stride_px: 1 })[0];
+    let (all, half) = (GainField::new(&belief), std::f32::consts::LN_2);
+    let unseen = all.with_seen(&seen);
+    assert_eq!((gain(&all), gain(&unseen)), (half, half));
+    assert!((gain(&all.with_prediction(&prediction)) - 1.5 * half).abs() < 1e-5);
+    assert!((gain(&unseen.with_prediction(&prediction)) - 0.5 * half).abs() < 1e-5);
 }
 
 #[test]

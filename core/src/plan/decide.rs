@@ -2,7 +2,7 @@
 
 use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated};
 use super::weigh::{Weighed, random_push, weigh_pushes};
-use super::{Action, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field};
+use super::{Action, Counted, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field};
 use crate::camera::ViewId;
 use crate::gain::{RayDensity, best_pair, gain_of_views};
 use crate::rng::stream;
@@ -38,17 +38,17 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         motion: None,
     };
     let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
-    let guard = || push_guard(history, situation.budget, complete(), settings.quiet_steps);
+    let guard = || push_guard(history, situation.budget, complete(), settings.quiet_steps, settings.closing_steps);
     match policy {
         PolicyKind::Mem => {
-            if let (true, Some(view)) = (history.just_pushed(), history.view_of_push) {
+            if let (Counted::All, true, Some(view)) = (settings.counted, history.just_pushed(), history.view_of_push) {
                 decision.action = Action::Look { view };
                 decision.reason = Reason::ViewOfPush;
             } else if let Some(reason) = guard() {
                 decision.reason = reason;
             } else {
                 let weighed = weigh_pushes(settings, situation, &field);
-                choose(&mut decision, weighed, settings.gamma);
+                choose(&mut decision, weighed, settings);
             }
         }
         PolicyKind::MemNoPush => (),
@@ -74,7 +74,7 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
 }
 
 /// Applies the rule to what was weighed.
-fn choose(decision: &mut Decision, weighed: Weighed, gamma: f32) {
+fn choose(decision: &mut Decision, weighed: Weighed, settings: &PlannerSettings) {
     decision.candidates = weighed.candidates;
     decision.best_push = weighed.best;
     decision.motion = weighed.motion;
@@ -84,7 +84,7 @@ fn choose(decision: &mut Decision, weighed: Weighed, gamma: f32) {
     };
     decision.igm = best.gain.unwrap_or(0.0);
     decision.reg = best.reg.unwrap_or(0.0);
-    decision.reason = look_or_push(decision.igv, decision.igm, decision.reg, gamma);
+    decision.reason = look_or_push(settings.patience * decision.igv, decision.igm, decision.reg, settings.gamma);
     if decision.reason == Reason::PushTellsMore {
         decision.action = Action::Push(best.push);
     }

@@ -4,6 +4,12 @@ use super::{History, Reason};
 
 /// The first steps, in which nothing is pushed: the map is still too empty to push by.
 pub const QUIET_STEPS: usize = 3;
+/// The last steps, in which nothing is pushed, when all voxels count: after the last one nothing would be looked at.
+pub const CLOSING_STEPS: usize = 1;
+/// The last steps, in which nothing is pushed, when unseen voxels count.
+pub const RESTORING_STEPS: usize = 4;
+/// How many times what looking promises a push has to promise when unseen voxels count.
+pub const PATIENCE: f32 = 10.0;
 /// The scheduled policies push at every step whose number, counted from 1, is a multiple of this.
 pub const PUSH_EVERY: usize = 5;
 /// Relative difference of two consecutive best gains below which looking is saturated.
@@ -17,15 +23,21 @@ pub fn look_or_push(igv: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
 }
 
 /// Why no push is allowed in the next step, or `None` if one is. Of several reasons the lasting ones are named first.
-/// In the first `quiet_steps` steps, by default [`QUIET_STEPS`], nothing is pushed.
-pub fn push_guard(history: &History, budget: usize, map_complete: bool, quiet_steps: usize) -> Option<Reason> {
+/// In the first `quiet_steps` steps, by default [`QUIET_STEPS`], nothing is pushed, nor in the last `closing_steps`.
+pub fn push_guard(
+    history: &History,
+    budget: usize,
+    map_complete: bool,
+    quiet_steps: usize,
+    closing_steps: usize,
+) -> Option<Reason> {
     let step = history.actions.len();
     let guards = [
         (history.dropped, Reason::Dropped),
         (map_complete, Reason::MapComplete),
         (step < quiet_steps, Reason::TooEarly),
         (history.just_pushed(), Reason::JustPushed),
-        (step + 1 >= budget, Reason::LastStep),
+        (step + closing_steps >= budget, Reason::LastStep),
     ];
     guards.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
 }
@@ -65,27 +77,44 @@ mod tests {
     #[test]
     fn no_push_in_the_first_three_steps_and_none_in_the_last() {
         for step in 0..3 {
-            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS), Some(Reason::TooEarly));
+            assert_eq!(
+                push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS, CLOSING_STEPS),
+                Some(Reason::TooEarly)
+            );
         }
         for step in 3..19 {
-            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS), None);
+            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS, CLOSING_STEPS), None);
         }
-        assert_eq!(push_guard(&after(&[LOOK; 19]), 20, false, QUIET_STEPS), Some(Reason::LastStep));
-        assert_eq!(push_guard(&after(&[LOOK; 3]), 20, false, 4), Some(Reason::TooEarly), "a longer quiet time");
+        assert_eq!(push_guard(&after(&[LOOK; 19]), 20, false, QUIET_STEPS, CLOSING_STEPS), Some(Reason::LastStep));
+        assert_eq!(push_guard(&after(&[LOOK; 15]), 20, false, QUIET_STEPS, RESTORING_STEPS), None);
+        let closing = push_guard(&after(&[LOOK; 16]), 20, false, QUIET_STEPS, RESTORING_STEPS);
+        assert_eq!(closing, Some(Reason::LastStep), "looks that make good what a push disturbs");
+        assert_eq!(
+            push_guard(&after(&[LOOK; 3]), 20, false, 4, CLOSING_STEPS),
+            Some(Reason::TooEarly),
+            "a longer quiet time"
+        );
     }
 
     #[test]
     fn no_push_twice_in_a_row() {
-        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH]), 20, false, QUIET_STEPS), Some(Reason::JustPushed));
-        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH, LOOK]), 20, false, QUIET_STEPS), None);
+        assert_eq!(
+            push_guard(&after(&[LOOK, LOOK, LOOK, PUSH]), 20, false, QUIET_STEPS, CLOSING_STEPS),
+            Some(Reason::JustPushed)
+        );
+        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH, LOOK]), 20, false, QUIET_STEPS, CLOSING_STEPS), None);
     }
 
     #[test]
     fn no_push_on_a_complete_map_nor_after_a_drop() {
-        assert_eq!(push_guard(&after(&[LOOK; 5]), 20, true, QUIET_STEPS), Some(Reason::MapComplete));
+        assert_eq!(push_guard(&after(&[LOOK; 5]), 20, true, QUIET_STEPS, CLOSING_STEPS), Some(Reason::MapComplete));
         let dropped = History { dropped: true, ..after(&[LOOK; 5]) };
-        assert_eq!(push_guard(&dropped, 20, false, QUIET_STEPS), Some(Reason::Dropped));
-        assert_eq!(push_guard(&dropped, 20, true, QUIET_STEPS), Some(Reason::Dropped), "the lasting reason is named");
+        assert_eq!(push_guard(&dropped, 20, false, QUIET_STEPS, CLOSING_STEPS), Some(Reason::Dropped));
+        assert_eq!(
+            push_guard(&dropped, 20, true, QUIET_STEPS, CLOSING_STEPS),
+            Some(Reason::Dropped),
+            "the lasting reason is named"
+        );
     }
 
     #[test]

@@ -251,6 +251,11 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
     let next = table.decide(PolicyKind::Mem);
     assert_eq!((next.action, next.reason), (Action::Look { view: worth }, Reason::ViewOfPush));
     assert!(next.candidates.is_empty());
+    // Where unseen voxels count, it looks where most is to be gained now: the push may have done something else.
+    let settings = table.settings;
+    table.settings = settings.counting(Counted::Unseen);
+    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::JustPushed);
+    table.settings = settings;
     table.history.record(&next, false);
     assert_eq!(table.history.view_of_push, None);
     assert_ne!(table.decide(PolicyKind::Mem).reason, Reason::ViewOfPush);
@@ -278,6 +283,10 @@ fn disturbance_counts_blurred_labels_and_never_rewards() {
     assert!(reg < -1.0 && (decision.reg - reg).abs() < 1e-2, "{reg} {}", decision.reg);
     // With enough weight it turns the decision.
     table.settings.gamma = 1.1 * (decision.igm - decision.igv) / -decision.reg;
+    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
+
+    // So does patience.
+    table.settings = PlannerSettings { patience: 1.1 * decision.igm / decision.igv, ..PlannerSettings::default() };
     assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
 
     let mut sharper = Prophet::Forgets.predict_pushes(&table.belief, &[swept()]).remove(0);

@@ -8,7 +8,7 @@ use crate::workbench::command::Command;
 use crate::workbench::model::{Hovered, Model};
 use crate::workbench::session::{Activity, Session};
 use nudge_core::camera::ViewId;
-use nudge_core::plan::{Action, Decision, Reason};
+use nudge_core::plan::{Action, Decision, PlannerSettings, Reason};
 use rerun::external::egui::{self, Button, RichText, Ui};
 
 /// What the panel remembers.
@@ -44,10 +44,9 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         nothing(ui, session, "what the policy would do", ask);
         return touched;
     };
-    let gamma = session.record.config.planner.gamma;
     ui.spacing_mut().item_spacing.y = 4.0;
     header(ui, session, model.cursor);
-    verdict(ui, decision, gamma);
+    verdict(ui, decision, &session.record.config.planner);
     ui.add_space(4.0);
     views(state, ui, model, session, decision, &mut touched, ask);
     ui.add_space(4.0);
@@ -87,7 +86,8 @@ fn header(ui: &mut Ui, session: &Session, cursor: usize) {
 }
 
 /// Looking against pushing, as bars on one scale, and what follows.
-fn verdict(ui: &mut Ui, decision: &Decision, gamma: f32) {
+fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
+    let (gamma, patience) = (planner.gamma, planner.patience);
     let (look, push) = (decision.igv, decision.igm + gamma * decision.reg);
     let weighed = decision.best_push.is_some() && decision.igm != 0.0;
     let scale = look.max(decision.igm).max(1e-6);
@@ -109,8 +109,9 @@ fn verdict(ui: &mut Ui, decision: &Decision, gamma: f32) {
         let reg = gamma * decision.reg;
         let hint = "What the push would blur, at most 0: Reg = min(0, H(labels) − H(labels, predicted))";
         bar(ui, "γ·Reg", reg, 0.1, false, hint);
-        let gap = look - push;
-        let text = format!("IGV − (IGM + γ·Reg) = {}", words::nats(gap));
+        let times = if patience == 1.0 { String::new() } else { format!("{patience}·") };
+        let gap = patience * look - push;
+        let text = format!("{times}IGV − (IGM + γ·Reg) = {}", words::nats(gap));
         ui.label(RichText::new(text).small()).on_hover_text("The rule looks if this is above 0, and else pushes");
     } else {
         ui.label(RichText::new("No push was weighed").small().weak());

@@ -168,6 +168,7 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
                     let choice = ui.add_enabled(missing.is_none(), choice);
                     if choice.on_disabled_hover_text(missing.map_or("", String::as_str)).clicked() {
                         form.belief = (*belief).to_owned();
+                        form.planner = form.planner.counting(Counted::of_belief(belief));
                     }
                 }
             })
@@ -190,7 +191,9 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
             .selected_text(gain_of(form.planner.counted))
             .show_ui(ui, |ui| {
                 for counted in Counted::ALL {
-                    ui.selectable_value(&mut form.planner.counted, counted, gain_of(counted));
+                    if ui.selectable_label(form.planner.counted == counted, gain_of(counted)).clicked() {
+                        form.planner = form.planner.counting(counted);
+                    }
                 }
             })
             .response
@@ -243,6 +246,16 @@ fn thresholds(ui: &mut egui::Ui, planner: &mut PlannerSettings) {
         ui.add(egui::DragValue::new(&mut planner.quiet_steps).range(0..=50).suffix(" looks"))
             .labelled_by(label.id)
             .on_hover_text("The first steps, in which nothing is pushed, 0 to 50; 3 in the paper");
+        ui.end_row();
+        let label = ui.label("no push in the last");
+        ui.add(egui::DragValue::new(&mut planner.closing_steps).range(1..=50).suffix(" steps"))
+            .labelled_by(label.id)
+            .on_hover_text("The last steps, in which nothing is pushed, 1 to 50; 1 in the paper");
+        ui.end_row();
+        let label = ui.label("patience");
+        ui.add(egui::DragValue::new(&mut planner.patience).range(0.1..=100.0).speed(0.1))
+            .labelled_by(label.id)
+            .on_hover_text("Look if patience IGV > IGM + γ Reg, 0.1 to 100; 1 in the paper");
         ui.end_row();
         let label = ui.label("saturated below");
         ui.add(share(&mut planner.saturation))

@@ -136,7 +136,7 @@ fn view_gain(field: &GainField, camera: &Camera, density: RayDensity) -> i64 {
     sum
 }
 
-/// A ray's gain in units of 2^-24 nats. A ray gains, or owes, less than 4 nats, so this fits.
+/// A ray's gain in units of 2^-24 nats. A ray gains less than 4 nats, so this fits.
 #[inline(always)]
 fn ray_gain(field: &GainField, ray: Ray) -> i32 {
     struct Gain(f32);

@@ -4,9 +4,13 @@
 //! natural-log entropy of the mean distribution (nats); epistemic uncertainty is `K / sum(a)` for a Dirichlet and
 //! the Beta's variance for a voxel (Marques et al., manipulation-enhanced mapping; Ulmer et al. 2023).
 
+mod carried;
 mod classical;
 mod floor;
 
+#[cfg(feature = "cnabu")]
+pub(crate) use carried::Carried;
+pub(crate) use carried::SOLID;
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
 
@@ -208,9 +212,14 @@ impl SweptPush {
     }
 }
 
+/// Name of the classical update.
+pub const CLASSICAL: &str = "classical";
+/// Name of the networks' update ([`crate::cnabu`]).
+pub const CNABU: &str = "cnabu";
+
 /// How a belief changes with an observation (sigma_o) and how it is predicted to change with a push (sigma_m).
 pub trait BeliefUpdate: Send + Sync {
-    /// Name in episodes and reports: `classical`, `cnabu`.
+    /// Name in episodes and reports: [`CLASSICAL`], [`CNABU`].
     fn name(&self) -> &str;
 
     /// Whether beliefs over `grid` can be updated.

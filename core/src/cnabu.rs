@@ -31,18 +31,18 @@ pub use loss::{LossForm, expected_log_loss, kl_to_uniform, marginal_log_loss, oc
 #[cfg(feature = "cnabu")]
 pub use observe_net::{Evidence, ObserveConfig, ObserveNet};
 #[cfg(feature = "cnabu")]
-pub(crate) use predict::{push_planes, windows};
+pub(crate) use predict::{Numbers, Windowed, push_planes, windows};
 #[cfg(feature = "cnabu")]
 pub(crate) use push_net::WINDOW;
 #[cfg(feature = "cnabu")]
-pub use push_net::{PushConfig, PushNet, Pushed};
+pub use push_net::{PushConfig, PushNet, PushPlanes, Pushed};
 pub use scored::Scored;
 #[cfg(feature = "cnabu")]
 pub use tch::{Device, Tensor};
 #[cfg(feature = "cnabu")]
 pub use update::Cnabu;
 #[cfg(feature = "cnabu")]
-pub(crate) use update::observation_planes;
+pub(crate) use update::{belief_of, observation_planes};
 #[cfg(feature = "cnabu")]
 pub use weights::{Card, card_path, read_tensors, write_tensors};
 

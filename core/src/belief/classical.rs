@@ -11,7 +11,7 @@
 
 mod push;
 
-use super::{Belief, BeliefUpdate, FloorPlan, PushPrediction, SweptPush};
+use super::{Belief, BeliefUpdate, CLASSICAL, FloorPlan, PushPrediction, SOLID, SweptPush};
 use crate::camera::MapObservation;
 use crate::scene::CLASS_COUNT;
 use rayon::prelude::*;
@@ -27,7 +27,7 @@ pub struct Classical;
 
 impl BeliefUpdate for Classical {
     fn name(&self) -> &str {
-        "classical"
+        CLASSICAL
     }
 
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief {
@@ -55,7 +55,7 @@ impl BeliefUpdate for Classical {
     }
 
     fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
-        let plan = FloorPlan::new(belief, push::SOLID);
+        let plan = FloorPlan::new(belief, SOLID);
         pushes.par_iter().map(|push| push::predict(belief, &plan, push)).collect()
     }
 }

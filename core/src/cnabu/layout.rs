@@ -8,7 +8,7 @@
 //! Evidence goes in as its logarithm, which squashes it and is 0 for the uniform prior.
 
 use crate::arm::Push;
-use crate::belief::Belief;
+use crate::belief::{Belief, Carried};
 use crate::camera::{MapObservation, UNOBSERVED};
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::CLASS_COUNT;
@@ -165,11 +165,36 @@ impl Layout {
         }
     }
 
-    /// Per floor cell whether `changed` says so: [`SUBS`] planes of 0 and 1 (zero before).
-    pub(crate) fn put_cells(&self, changed: &[bool], mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
+    /// Where what a push carries along stood, and where it comes to: two times [`SUBS`] planes (zero before).
+    pub(crate) fn put_carried(&self, carried: &Carried, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
+        let (stood, comes) = out.split_at_mut(SUBS * x.len() * self.pixels[1]);
+        self.put_cells(|cell| carried.stood(cell), mirror, x.clone(), stood);
+        self.put_cells(|cell| carried.source(cell).is_some(), mirror, x, comes);
+    }
+
+    /// Channels of the (mirrored) whole `planes`, carried along to where they come to in the pixels `x` (zero before).
+    pub(crate) fn put_arriving(
+        &self,
+        carried: &Carried,
+        planes: &[f32],
+        mirror: Mirror,
+        x: Range<usize>,
+        out: &mut [f32],
+    ) {
+        let (whole, plane) = (self.plane(), x.len() * self.pixels[1]);
+        for (cell, sub, pixel) in self.cells(mirror, x) {
+            let Some(source) = carried.source(cell) else { continue };
+            let (from, at) = self.place(source, mirror);
+            for channel in (0..planes.len() / whole).step_by(SUBS) {
+                out[(channel + sub) * plane + pixel] = planes[(channel + from) * whole + at];
+            }
+        }
+    }
+
+    /// Floor cells that `is` holds of: [`SUBS`] planes of 0 and 1 (zero before).
+    pub(crate) fn put_cells(&self, is: impl Fn(usize) -> bool, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
         let plane = x.len() * self.pixels[1];
-        for (cell, sub, pixel) in self.cells(mirror, x).filter(|(cell, ..)| changed[*cell]) {
-            debug_assert!(cell < changed.len());
+        for (_, sub, pixel) in self.cells(mirror, x).filter(|(cell, ..)| is(*cell)) {
             out[sub * plane + pixel] = 1.0;
         }
     }
@@ -254,6 +279,7 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::belief::{FloorPlan, SOLID, SweptPush};
 
     fn grid() -> Grid {
         Grid::for_shelf([0.80, 0.40, 0.40], 0.005)
@@ -371,6 +397,85 @@ mod tests {
                 assert_eq!(part[channel * 40 * along..][..40 * along], whole[from..from + 40 * along]);
             }
         }
+    }
+
+    /// A push that meets a box 3 cm along its way of 8 cm, towards the far right.
+    fn push_of_a_box() -> (Belief, SweptPush) {
+        let mut belief = Belief::uniform(grid());
+        let mut swept = VoxelSet::empty(&grid());
+        let push = Push { start: [0.10, 0.12, 0.06], direction_deg: 60.0, length_m: 0.08 };
+        for index in 0..grid().voxel_count() {
+            let at = grid().center(grid().voxel(index));
+            let cell = index / grid().dims[2];
+            let inside = (0.08..0.16).contains(&at.x) && (0.146..0.19).contains(&at.y) && at.z < 0.12;
+            belief.occupancy[index] = if inside { [9.0 + at.x, 1.5] } else { [1.0, 12.0] };
+            belief.semantics[cell][if inside { 5 } else { 14 }] = 4.0 + at.y;
+            let along = (at.x - 0.10) * 0.5 + (at.y - 0.12) * 0.866;
+            let beside = ((at.y - 0.12) * 0.5 - (at.x - 0.10) * 0.866).abs();
+            if (0.0..0.08).contains(&along) && beside < 0.01 && (0.04..0.08).contains(&at.z) {
+                swept.insert(index);
+            }
+        }
+        (belief, SweptPush { push, swept })
+    }
+
+    #[test]
+    fn what_is_carried_along_arrives_whole_mirrored_or_not() {
+        let layout = Layout::new(&grid()).expect("5 mm");
+        let (belief, push) = push_of_a_box();
+        let carried = Carried::by(&push, &belief, &FloorPlan::new(&belief, SOLID)).expect("the tool meets the box");
+        let evidence = |belief: &Belief| {
+            let plane = layout.plane();
+            let (mut occupancy, mut semantics) = (vec![0.0; 2 * OCCUPANCY * plane], vec![0.0; SEMANTICS * plane]);
+            layout.put_belief(belief, &mut occupancy, &mut semantics);
+            [occupancy, semantics]
+        };
+        // The belief of what arrives alone.
+        let mut expected = Belief::uniform(grid());
+        let mut count = 0;
+        for cell in 0..grid().cell_count() {
+            let Some(source) = carried.source(cell) else { continue };
+            let from = &belief.occupancy[grid().column(source)];
+            expected.occupancy[grid().column(cell)].copy_from_slice(from);
+            expected.semantics[cell] = belief.semantics[source];
+            assert!(carried.stood(source) && belief.semantics[source][5] > 4.0, "it comes from the box");
+            let way = [0, 1].map(|axis| {
+                let at = [cell, source].map(|cell| [grid().cell(cell).x, grid().cell(cell).y][axis] as f32);
+                (at[0] - at[1]) * 0.005
+            });
+            // 8 cm less the 3 cm before the contact, towards 60 degrees.
+            assert!((way[0] - 0.025).abs() < 0.008 && (way[1] - 0.043).abs() < 0.008, "{way:?}");
+            count += 1;
+        }
+        assert_eq!(count, 16 * 9, "all of its cells arrive");
+        let [x, y] = layout.pixels().map(|n| n as i64);
+        let tensor = |planes: &[f32]| tch::Tensor::from_slice(planes).reshape([1, -1, x, y]);
+        for (planes, expected) in evidence(&belief).iter().zip(&evidence(&expected)) {
+            let arriving = |planes: &[f32], mirror| {
+                let mut out = vec![0.0; planes.len()];
+                layout.put_arriving(&carried, planes, mirror, layout.whole(), &mut out);
+                out
+            };
+            let here = arriving(planes, Mirror::No);
+            assert_eq!(&here, expected);
+            let mirrored = |planes: &[f32]| {
+                let occupancy = tensor(planes);
+                super::super::Evidence { semantics: occupancy.shallow_clone(), occupancy }.mirrored().occupancy
+            };
+            let turned = Vec::<f32>::try_from(mirrored(planes).flatten(0, -1)).expect("numbers");
+            assert!(tensor(&arriving(&turned, Mirror::X)).equal(&mirrored(&here)));
+        }
+        let mut marks = vec![0.0; 2 * SUBS * layout.plane()];
+        layout.put_carried(&carried, Mirror::No, layout.whole(), &mut marks);
+        let (stood, comes) = marks.split_at(SUBS * layout.plane());
+        assert_eq!([stood, comes].map(|marks| marks.iter().sum::<f32>() as usize), [count; 2]);
+    }
+
+    #[test]
+    fn a_push_through_air_carries_nothing_along() {
+        let (belief, push) = push_of_a_box();
+        let air = Belief { occupancy: vec![[1.0, 9.0]; grid().voxel_count()], ..belief };
+        assert!(Carried::by(&push, &air, &FloorPlan::new(&air, SOLID)).is_none());
     }
 
     #[test]

@@ -16,6 +16,16 @@ const SLICE_LEVEL: i64 = 3;
 /// Largest `ln a` that is carried on: evidence of about 1,100.
 pub(super) const LOG_EVIDENCE_LIMIT: f64 = 7.0;
 
+/// `z` of `kinds` kinds (occupied and free, or classes; `[B, kinds * ..., X, Y]`) with the evidence limited: where the
+/// largest is above [`LOG_EVIDENCE_LIMIT`] all kinds are lowered alike, so that the mean stays what it was. (Cut one by one,
+/// all kinds above the limit would become equally probable.)
+pub(super) fn limited(z: &Tensor, kinds: usize) -> Tensor {
+    let size = z.size();
+    let by_kind = z.view([size[0], kinds as i64, -1, size[2], size[3]]);
+    let above = (by_kind.amax([1], true) - LOG_EVIDENCE_LIMIT).clamp_min(0.0);
+    (by_kind - above).view(&size[..])
+}
+
 /// What the network's size is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ObserveConfig {
@@ -47,8 +57,8 @@ impl Evidence {
 
     /// What heads gave, as state: `ln a = softplus(z)`, limited, cut off from its history.
     pub fn of_heads(z_occupancy: &Tensor, z_semantics: &Tensor) -> Self {
-        let log = |z: &Tensor| z.detach().softplus().clamp_max_(LOG_EVIDENCE_LIMIT);
-        Self { occupancy: log(z_occupancy), semantics: log(z_semantics) }
+        let log = |z: &Tensor, kinds: usize| limited(&z.detach(), kinds).softplus();
+        Self { occupancy: log(z_occupancy, 2), semantics: log(z_semantics, CLASS_COUNT) }
     }
 
     /// The same with numbers of another kind.
@@ -164,5 +174,19 @@ impl ObserveNet {
     /// Numbers of levels and classes that the planes hold.
     pub fn counts() -> (usize, usize) {
         (LEVELS, CLASS_COUNT)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LOG_EVIDENCE_LIMIT, limited};
+    use tch::Tensor;
+
+    #[test]
+    fn evidence_is_limited_without_changing_what_is_likeliest() {
+        // Three classes (kinds) of two sub-cells at one pixel: the first sub-cell's evidence is too large, the second's not.
+        let z = Tensor::from_slice(&[9.0_f32, 1.0, 12.0, 6.5, -3.0, 2.0]).reshape([1, 6, 1, 1]);
+        let limited = Vec::<f32>::try_from(limited(&z, 3).flatten(0, -1)).expect("numbers");
+        assert_eq!(limited, [4.0, 1.0, LOG_EVIDENCE_LIMIT as f32, 6.5, -8.0, 2.0]);
     }
 }

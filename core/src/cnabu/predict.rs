@@ -1,9 +1,9 @@
 //! sigma_m's predictions: candidates in batches, windows around the pushes, gated with the probability of change.
 
 use super::layout::{LEVELS, Layout, Mirror, OCCUPANCY, SEMANTICS, SUBS, VOXELS_PER_LEVEL};
-use super::observe_net::{Evidence, LOG_EVIDENCE_LIMIT};
-use super::push_net::{MARKS, PushNet, Pushed, WINDOW};
-use crate::belief::{Belief, PushPrediction, SweptPush};
+use super::observe_net::{Evidence, limited};
+use super::push_net::{MARKS, PushNet, PushPlanes, Pushed, WINDOW};
+use crate::belief::{Belief, Carried, FloorPlan, PushPrediction, SOLID, SweptPush};
 use crate::grid::Window;
 use crate::scene::CLASS_COUNT;
 use rayon::prelude::*;
@@ -15,23 +15,59 @@ const BATCH: usize = 16;
 /// Probability of change below which a floor cell keeps its belief as it is.
 const CHANGE_FLOOR: f32 = 0.02;
 
-/// What pushes look like to the network, in windows (of mirrored planes, if so).
-pub(crate) fn push_planes(layout: &Layout, pushes: &[(&SweptPush, Range<usize>)], mirror: Mirror) -> (Tensor, Tensor) {
-    let width = pushes.first().map_or(0, |(_, x)| x.len());
+/// A push, what it carries along, and the pixels of its window.
+pub(crate) struct Windowed<'a> {
+    pub(crate) push: &'a SweptPush,
+    pub(crate) carried: Option<&'a Carried>,
+    pub(crate) x: Range<usize>,
+}
+
+/// Planes of evidence as numbers that a window's can be taken from: occupancy and semantics.
+pub(crate) struct Numbers([Vec<f32>; 2]);
+
+impl Numbers {
+    /// Those of evidence planes of one belief.
+    pub(crate) fn of(evidence: &Evidence) -> Self {
+        Self([values(&evidence.occupancy), values(&evidence.semantics)])
+    }
+}
+
+/// A tensor's numbers, on the processor.
+pub(super) fn values(tensor: &Tensor) -> Vec<f32> {
+    let mut out = vec![0.0_f32; tensor.numel()];
+    tensor.to_device(Device::Cpu).to_kind(Kind::Float).contiguous().copy_data(&mut out, tensor.numel());
+    out
+}
+
+/// What pushes look like to the network, in windows (of mirrored planes, if so), from the logarithms of the (mirrored)
+/// prior's evidence.
+pub(crate) fn push_planes(layout: &Layout, prior: &Numbers, pushes: &[Windowed<'_>], mirror: Mirror) -> PushPlanes {
+    let width = pushes.first().map_or(0, |push| push.x.len());
     let across = layout.pixels()[1];
     let plane = width * across;
-    let (mut swept, mut marks) =
-        (vec![0.0_f32; OCCUPANCY * plane * pushes.len()], vec![0.0_f32; MARKS * plane * pushes.len()]);
-    swept.par_chunks_mut(OCCUPANCY * plane).zip(marks.par_chunks_mut(MARKS * plane)).zip(pushes).for_each(
-        |((swept, marks), (push, x))| {
-            layout.put_set(&push.swept, mirror, x.clone(), swept);
-            layout.put_marks(&push.push, mirror, x.clone(), marks);
-        },
-    );
-    let tensor = |planes: &[f32], channels: usize| {
-        Tensor::from_slice(planes).reshape([pushes.len() as i64, channels as i64, width as i64, across as i64])
+    let planes = |channels: usize, fill: &(dyn Fn(&Windowed<'_>, &mut [f32]) + Sync)| {
+        let mut out = vec![0.0_f32; channels * plane * pushes.len()];
+        out.par_chunks_mut(channels * plane).zip(pushes).for_each(|(out, push)| fill(push, out));
+        Tensor::from_slice(&out).reshape([pushes.len() as i64, channels as i64, width as i64, across as i64])
     };
-    (tensor(&swept, OCCUPANCY), tensor(&marks, MARKS))
+    let arriving = |which: usize, channels: usize| {
+        planes(channels, &|push, out| {
+            if let Some(carried) = push.carried {
+                layout.put_arriving(carried, &prior.0[which], mirror, push.x.clone(), out);
+            }
+        })
+    };
+    PushPlanes {
+        swept: planes(OCCUPANCY, &|push, out| layout.put_set(&push.push.swept, mirror, push.x.clone(), out)),
+        marks: planes(MARKS, &|push, out| {
+            let (ends, carry) = out.split_at_mut(out.len() / 2);
+            layout.put_marks(&push.push.push, mirror, push.x.clone(), ends);
+            if let Some(carried) = push.carried {
+                layout.put_carried(carried, mirror, push.x.clone(), carry);
+            }
+        }),
+        arriving: Evidence { occupancy: arriving(0, 2 * OCCUPANCY), semantics: arriving(1, SEMANTICS) },
+    }
 }
 
 /// Windows of planes `[1, C, X, Y]`, one above the other: `[B, C, WINDOW, Y]`.
@@ -50,13 +86,20 @@ pub(super) fn predict(
     device: Device,
 ) -> Vec<PushPrediction> {
     let stem = net.prior_stem(prior);
+    let numbers = Numbers::of(prior);
+    let plan = FloorPlan::new(belief, SOLID);
     let mut predictions = Vec::with_capacity(pushes.len());
     for batch in pushes.chunks(BATCH) {
-        let xs: Vec<Range<usize>> = batch.iter().map(|push| layout.around(&push.push, WINDOW)).collect();
-        let windowed: Vec<_> = batch.iter().zip(xs.iter().cloned()).collect();
-        let (swept, marks) = push_planes(layout, &windowed, Mirror::No);
+        let carried: Vec<_> = batch.par_iter().map(|push| Carried::by(push, belief, &plan)).collect();
+        let windowed: Vec<_> = batch
+            .iter()
+            .zip(&carried)
+            .map(|(push, carried)| Windowed { push, carried: carried.as_ref(), x: layout.around(&push.push, WINDOW) })
+            .collect();
+        let xs: Vec<Range<usize>> = windowed.iter().map(|push| push.x.clone()).collect();
+        let planes = push_planes(layout, &numbers, &windowed, Mirror::No).to_device(device);
         let prior = Evidence { occupancy: windows(&prior.occupancy, &xs), semantics: windows(&prior.semantics, &xs) };
-        let pushed = net.forward(&windows(&stem, &xs), &prior, &swept.to_device(device), &marks.to_device(device));
+        let pushed = net.forward(&windows(&stem, &xs), &prior, &planes);
         let planes = Planes::of(&pushed, layout.pixels()[1]);
         predictions.par_extend(xs.into_par_iter().enumerate().map(|(at, x)| planes.prediction(at, layout, belief, x)));
     }
@@ -74,18 +117,13 @@ struct Planes {
 
 impl Planes {
     fn of(pushed: &Pushed, across: usize) -> Self {
-        let values = |tensor: &Tensor| {
-            let mut out = vec![0.0_f32; tensor.numel()];
-            tensor.to_device(Device::Cpu).to_kind(Kind::Float).contiguous().copy_data(&mut out, tensor.numel());
-            out
-        };
-        let evidence = |z: &Tensor| z.clamp_max(LOG_EVIDENCE_LIMIT).exp() + 1.0;
-        let change = evidence(&pushed.change);
+        let evidence = |z: &Tensor, kinds: usize| limited(z, kinds).exp() + 1.0;
+        let change = evidence(&pushed.change, 2);
         let (yes, no) = (change.narrow(1, 0, SUBS as i64), change.narrow(1, SUBS as i64, SUBS as i64));
         let size = pushed.change.size();
         Self {
-            occupancy: values(&evidence(&pushed.occupancy)),
-            semantics: values(&evidence(&pushed.semantics)),
+            occupancy: values(&evidence(&pushed.occupancy, 2)),
+            semantics: values(&evidence(&pushed.semantics, CLASS_COUNT)),
             change: values(&(&yes / (&yes + no))),
             plane: (size[2] * size[3]) as usize,
             across,

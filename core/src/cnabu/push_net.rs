@@ -4,6 +4,10 @@
 //! The network sees a window of the floor plan around the push: as wide as the tool and what it moves can reach, and as
 //! deep as the shelf. Its stem is made of 1 x 1 convolutions, so the prior's part is computed once for all candidates of a
 //! decision and cut out per window. As in sigma_o the prior leads past the U-Net to the heads.
+//!
+//! Convolutions are bad at carrying a class or a height over 10 cm of floor. So the network is also shown a guess: the
+//! evidence of what the tool meets first, moved with the tool (the classical rule's guess, without a turn and without
+//! what is pushed in turn). It leads past the U-Net too; what becomes of it is learnt.
 
 use super::layout::{OCCUPANCY, SEMANTICS, SUBS};
 use super::net::{UNet, conv};
@@ -13,8 +17,10 @@ use tch::nn::{self, Module};
 
 /// Pixels of the window along x: 0.4 m.
 pub(crate) const WINDOW: usize = 40;
-/// Planes that mark the ends of the push: start, end.
-pub(super) const MARKS: usize = 2 * SUBS;
+/// Planes that mark floor cells: where the push starts, where it ends, where what it carries along stood, where that comes to.
+pub(super) const MARKS: usize = 4 * SUBS;
+/// Planes of the change of floor cells: for and against.
+const CHANGE: usize = 2 * SUBS;
 
 /// What the network's size is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +46,31 @@ pub struct Pushed {
     pub change: Tensor,
 }
 
+/// What pushes look like, in windows.
+#[derive(Debug)]
+pub struct PushPlanes {
+    /// `[B, levels * 4, WINDOW, Y]`: what the tool and the arm sweep.
+    pub swept: Tensor,
+    /// `[B, 4 * 4, WINDOW, Y]`: start and end; where what is carried along stood, and where it comes to.
+    pub marks: Tensor,
+    /// The logarithms of the evidence that is carried along, where it comes to; 0 elsewhere.
+    pub arriving: Evidence,
+}
+
+impl PushPlanes {
+    /// The same on a device.
+    pub fn to_device(&self, device: tch::Device) -> Self {
+        Self {
+            swept: self.swept.to_device(device),
+            marks: self.marks.to_device(device),
+            arriving: Evidence {
+                occupancy: self.arriving.occupancy.to_device(device),
+                semantics: self.arriving.semantics.to_device(device),
+            },
+        }
+    }
+}
+
 /// The network sigma_m.
 #[derive(Debug)]
 pub struct PushNet {
@@ -47,10 +78,13 @@ pub struct PushNet {
     stem_semantics: nn::Conv2D,
     stem_swept: nn::Conv2D,
     stem_marks: nn::Conv2D,
+    stem_arriving: nn::Conv2D,
+    stem_labels: nn::Conv2D,
     unet: UNet,
     occupancy_head: nn::Conv2D,
     semantic_mix: nn::Conv2D,
     semantic_prior: nn::Conv2D,
+    semantic_arriving: nn::Conv2D,
     semantic_inner: nn::Conv2D,
     semantic_head: nn::Conv2D,
     change_inner: nn::Conv2D,
@@ -59,6 +93,9 @@ pub struct PushNet {
     keep_semantics: Tensor,
     /// Per channel: what being swept adds to `z`.
     swept: Tensor,
+    /// Per channel: what the evidence that is carried along adds to `z`.
+    arriving_occupancy: Tensor,
+    arriving_semantics: Tensor,
 }
 
 impl PushNet {
@@ -81,17 +118,22 @@ impl PushNet {
             stem_semantics: conv(path / "stem_semantics", semantics, stem, 1),
             stem_swept: conv(path / "stem_swept", OCCUPANCY as i64, stem, 1),
             stem_marks: conv(path / "stem_marks", MARKS as i64, stem, 1),
+            stem_arriving: conv(path / "stem_arriving", occupancy, stem, 1),
+            stem_labels: conv(path / "stem_labels", semantics, stem, 1),
             unet: UNet::new(&(path / "unet"), stem, width),
             occupancy_head: small("occupancy_head", occupancy, 0.0),
             semantic_mix: conv(path / "semantic_mix", width, width, 1),
             semantic_prior: conv(path / "semantic_prior", semantics, width, 1),
+            semantic_arriving: conv(path / "semantic_arriving", semantics, width, 1),
             semantic_inner: conv(path / "semantic_inner", width, width, 3),
             semantic_head: small("semantic_head", semantics, -1.0),
             change_inner: conv(path / "change_inner", width, width, 3),
-            change_head: small("change_head", MARKS as i64, 0.0),
+            change_head: small("change_head", CHANGE as i64, 0.0),
             keep_occupancy: per_channel("keep_occupancy", occupancy, 0.5),
             keep_semantics: per_channel("keep_semantics", semantics, 0.5),
             swept: per_channel("swept", occupancy, 0.0),
+            arriving_occupancy: per_channel("arriving_occupancy", occupancy, 0.5),
+            arriving_semantics: per_channel("arriving_semantics", semantics, 0.5),
         }
     }
 
@@ -100,18 +142,29 @@ impl PushNet {
         prior.occupancy.apply(&self.stem_prior) + prior.semantics.apply(&self.stem_semantics)
     }
 
-    /// The prediction from the prior's stem and the prior, both cut to the windows, the swept levels
-    /// (`[B, levels * 4, WINDOW, Y]`) and the marks of start and end (`[B, 2 * 4, WINDOW, Y]`).
-    pub fn forward(&self, prior_stem: &Tensor, prior: &Evidence, swept: &Tensor, marks: &Tensor) -> Pushed {
-        let stem = prior_stem + swept.apply(&self.stem_swept) + marks.apply(&self.stem_marks);
+    /// The prediction from the prior's stem and the prior, both cut to the windows, and the pushes.
+    pub fn forward(&self, prior_stem: &Tensor, prior: &Evidence, pushes: &PushPlanes) -> Pushed {
+        let PushPlanes { swept, marks, arriving } = pushes;
+        let stem = prior_stem
+            + swept.apply(&self.stem_swept)
+            + marks.apply(&self.stem_marks)
+            + arriving.occupancy.apply(&self.stem_arriving)
+            + arriving.semantics.apply(&self.stem_labels);
         let features = self.unet.forward(&stem.relu());
         let occupancy = features
             .apply(&self.occupancy_head)
             .addcmul(&self.keep_occupancy, &prior.occupancy)
+            .addcmul(&self.arriving_occupancy, &arriving.occupancy)
             .addcmul(&self.swept, &Tensor::cat(&[swept, swept], 1));
-        let mixed = (features.apply(&self.semantic_mix) + prior.semantics.apply(&self.semantic_prior)).relu_();
+        let mixed = features.apply(&self.semantic_mix)
+            + prior.semantics.apply(&self.semantic_prior)
+            + arriving.semantics.apply(&self.semantic_arriving);
+        let mixed = mixed.relu();
         let inner = mixed.apply(&self.semantic_inner).relu_() + mixed;
-        let semantics = inner.apply(&self.semantic_head).addcmul(&self.keep_semantics, &prior.semantics);
+        let semantics = inner
+            .apply(&self.semantic_head)
+            .addcmul(&self.keep_semantics, &prior.semantics)
+            .addcmul(&self.arriving_semantics, &arriving.semantics);
         let change = features.apply(&self.change_inner).relu_().apply(&self.change_head);
         Pushed { occupancy, semantics, change }
     }

@@ -7,9 +7,11 @@ use crate::scene::{CLASS_COUNT, Catalog};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use tch::nn::VarStore;
-use tch::{Kind, Tensor};
+use tch::{Device, Kind, Tensor};
 
 /// Number of this kind of card and of the networks that it is about.
 const FORMAT: u32 = 1;
@@ -137,17 +139,56 @@ pub fn write_tensors(path: &Path, tensors: &[(String, Tensor)]) -> Result<()> {
     written
 }
 
-/// Reads named tensors, and refuses a file that is damaged.
+/// A tensor as a safetensors header tells of it.
+#[derive(Deserialize)]
+struct Stored {
+    dtype: String,
+    shape: Vec<i64>,
+    /// First byte and the one after the last, from the end of the header.
+    data_offsets: [u64; 2],
+}
+
+/// Maps a safetensors file into memory and gives its tensors by name, as views of that memory: nothing is read before it is
+/// used. Refuses a file that is damaged.
 ///
 /// # Errors
 /// For a file that is missing, truncated or no safetensors.
 pub fn read_tensors(path: &Path) -> Result<BTreeMap<String, Tensor>> {
-    if let Err(error) = std::fs::metadata(path) {
-        return Err(Error::io(path, error));
-    }
-    let tensors = Tensor::read_safetensors(path)
-        .map_err(|error| Error::input(path, "", format!("is damaged or no safetensors file: {}", one_line(&error))))?;
-    Ok(tensors.into_iter().collect())
+    let damaged = |what: &str| Error::input(path, "", format!("is damaged or no safetensors file: {what}"));
+    let mut file = File::open(path).map_err(|error| Error::io(path, error))?;
+    let length = file.metadata().map_err(|error| Error::io(path, error))?.len();
+    let mut size = [0; 8];
+    file.read_exact(&mut size).map_err(|_| damaged("it is too short"))?;
+    let begin = u64::from_le_bytes(size).checked_add(8).filter(|begin| *begin <= length);
+    let begin = begin.ok_or_else(|| damaged("its header is cut off"))?;
+    let mut header = vec![0; begin as usize - 8];
+    file.read_exact(&mut header).map_err(|error| Error::io(path, error))?;
+    let header: BTreeMap<String, serde_json::Value> =
+        serde_json::from_slice(&header).map_err(|error| damaged(&format!("its header: {error}")))?;
+    let name = path.to_str().ok_or_else(|| damaged("its path is not UTF-8"))?;
+    let bytes = Tensor::f_from_file(name, false, length as i64, (Kind::Uint8, Device::Cpu))
+        .map_err(|error| damaged(&one_line(&error)))?;
+    let tensor = |name: &str, value: serde_json::Value| {
+        let stored: Stored = serde_json::from_value(value).ok()?;
+        let (kind, size) = match stored.dtype.as_str() {
+            "F32" => (Kind::Float, 4),
+            "F16" => (Kind::Half, 2),
+            "I64" => (Kind::Int64, 8),
+            _ => return None,
+        };
+        let numbers = stored.shape.iter().try_fold(1_i64, |product, n| product.checked_mul(*n).filter(|n| *n > 0))?;
+        let [first, end] = stored.data_offsets.map(|offset| offset.checked_add(begin));
+        let (first, end) = (first? as i64, end.filter(|end| *end <= length)? as i64);
+        let fits = end.checked_sub(first)? == numbers.checked_mul(size)?;
+        let part = fits.then(|| bytes.narrow(0, first, end - first))?;
+        // Views of larger numbers have to begin at their multiples.
+        let part = if first % size == 0 { part } else { part.copy() };
+        Some((name.to_owned(), part.view_dtype(kind).view(&stored.shape[..])))
+    };
+    let tensors = header.into_iter().filter(|(name, _)| name != "__metadata__").map(|(name, value)| {
+        tensor(&name, value).ok_or_else(|| damaged(&format!("{name} is cut off or of an unknown kind")))
+    });
+    tensors.collect()
 }
 
 fn one_line(error: &tch::TchError) -> String {

@@ -22,10 +22,11 @@
 //! free for certain.
 
 use super::{LOG_ODDS_LIMIT, evidence, log_odds};
-use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, PushPrediction, SweptPush, beta_mean};
+use crate::Point;
+use crate::belief::carried::{Carried, Met, Track};
+use crate::belief::{Belief, FloorPlan, PushPrediction, SweptPush, beta_mean};
 use crate::grid::Window;
 use crate::scene::{BACKGROUND, CLASS_COUNT};
-use crate::{Point, Vector};
 
 /// Distance from the tip's track within which a thing surely changes, if the tool meets anything, metres.
 pub const NEAR_M: f32 = 0.03;
@@ -33,29 +34,20 @@ pub const NEAR_M: f32 = 0.03;
 pub const FAR_M: f32 = 0.09;
 /// How far the track is drawn out beyond the end of the push, metres: about the depth of what is pushed.
 pub const AHEAD_M: f32 = 0.06;
-/// Occupancy probability from which a voxel counts as part of a thing.
-pub(super) const SOLID: f32 = 0.6;
 /// Lower than any object is high, metres: what passes here passes through the whole column.
 pub const SHORTEST_M: f32 = 0.06;
 /// Evidence for free space where an object has left, strong enough to outweigh in the gate what was known of it.
 const GONE: f32 = 100.0;
 
-/// The belief that a push is predicted to leave. `plan` holds the belief's things ([`SOLID`]).
+/// The belief that a push is predicted to leave. `plan` holds the belief's things ([`SOLID`](crate::belief::SOLID)).
 pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> PushPrediction {
     let grid = &belief.grid;
     let height = grid.dims[2];
-    // Largest probability that the tool met something, per swept cell; negative where it did not pass. And how low it was.
-    let mut met = vec![-1.0_f32; grid.cell_count()];
-    let mut lowest = vec![height; grid.cell_count()];
-    for index in push.swept.iter() {
-        let (cell, level) = (index / height, index % height);
-        met[cell] = met[cell].max(beta_mean(belief.occupancy[index]));
-        lowest[cell] = lowest[cell].min(level);
-    }
-    let contact = met.iter().copied().fold(0.0, f32::max);
+    let met = Met::of(belief, push);
+    let contact = met.probability.iter().copied().fold(0.0, f32::max);
     let track = Track::of(push);
-    let moved = Moved::of(belief, plan, &met, &track);
-    let window = window(belief, &met, &track, moved.as_ref());
+    let carried = Carried::of(belief, plan, &met, &track);
+    let window = window(belief, &met, &track, carried.as_ref());
 
     let free = evidence(-LOG_ODDS_LIMIT, 1.0 + LOG_ODDS_LIMIT.exp());
     let gone = evidence(-LOG_ODDS_LIMIT, GONE);
@@ -70,15 +62,16 @@ pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> Pu
     for cell in window.cells(grid) {
         let column = &belief.occupancy[grid.column(cell)];
         let before = &belief.semantics[cell];
-        let left = moved.as_ref().is_some_and(|moved| moved.patch.contains(cell));
-        let source = moved.as_ref().and_then(|moved| moved.source(cell));
+        let left = carried.as_ref().is_some_and(|carried| carried.stood(cell));
+        let source = carried.as_ref().and_then(|carried| carried.source(cell));
         let change;
         let labels: [f32; CLASS_COUNT];
-        if met[cell] >= 0.0 {
-            let passed_low = lowest[cell] as f32 * grid.voxel_m <= SHORTEST_M;
-            let gone = passed_low || column[lowest[cell]..].iter().any(|a| beta_mean(*a) > 0.5);
-            let free_from = if gone { 0 } else { lowest[cell] };
-            change = met[cell];
+        if met.probability[cell] >= 0.0 {
+            let lowest = met.lowest[cell];
+            let passed_low = lowest as f32 * grid.voxel_m <= SHORTEST_M;
+            let gone = passed_low || column[lowest..].iter().any(|a| beta_mean(*a) > 0.5);
+            let free_from = if gone { 0 } else { lowest };
+            change = met.probability[cell];
             labels = if gone { background } else { *before };
             prediction.occupancy.extend(
                 column
@@ -101,7 +94,7 @@ pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> Pu
                 }
             }
         } else {
-            let near = if plan.stands(cell) { track.nearness(grid.cell_center(grid.cell(cell))) } else { 0.0 };
+            let near = if plan.stands(cell) { nearness(&track, grid.cell_center(grid.cell(cell))) } else { 0.0 };
             change = contact * near;
             labels = [1.0; CLASS_COUNT];
             let decayed = |a: &[f32; 2]| if beta_mean(*a) > 0.5 { gated(*a, [1.0; 2], change) } else { *a };
@@ -123,7 +116,7 @@ fn gated(before: [f32; 2], predicted: [f32; 2], p: f32) -> [f32; 2] {
 }
 
 /// The columns that the prediction may touch: swept cells, everything within reach of the track, and what moves.
-fn window(belief: &Belief, met: &[f32], track: &Track, moved: Option<&Moved>) -> Window {
+fn window(belief: &Belief, met: &Met, track: &Track, carried: Option<&Carried>) -> Window {
     let grid = &belief.grid;
     let (mut low, mut high) = ([usize::MAX; 2], [0_usize; 2]);
     let mut include = |at: [usize; 2]| {
@@ -132,10 +125,10 @@ fn window(belief: &Belief, met: &[f32], track: &Track, moved: Option<&Moved>) ->
             high[axis] = high[axis].max(at[axis] + 1);
         }
     };
-    for cell in (0..met.len()).filter(|&cell| met[cell] >= 0.0) {
+    for cell in (0..grid.cell_count()).filter(|&cell| met.probability[cell] >= 0.0) {
         include([cell / grid.dims[1], cell % grid.dims[1]]);
     }
-    for end in [track.start, track.start + track.direction * track.length] {
+    for end in [track.start, track.start + track.direction * (track.length + AHEAD_M)] {
         for reach in [-FAR_M, FAR_M] {
             let at: [usize; 2] = std::array::from_fn(|axis| {
                 let cell = ((end[axis] + reach - grid.origin[axis]) / grid.voxel_m).floor().max(0.0) as usize;
@@ -144,81 +137,21 @@ fn window(belief: &Belief, met: &[f32], track: &Track, moved: Option<&Moved>) ->
             include(at);
         }
     }
-    if let Some(moved) = moved {
-        for &cell in moved.patch.cells() {
-            let at = [cell / grid.dims[1], cell % grid.dims[1]];
-            include(at);
-            include(std::array::from_fn(|axis| (at[axis] as isize + moved.shift[axis]) as usize));
-        }
+    if let Some(carried) = carried {
+        carried.cells().for_each(include);
     }
     Window { x: [low[0], high[0]], y: [low[1], high[1]] }
 }
 
-/// The object that the tool meets first, and how far it goes with the tool.
-struct Moved {
-    patch: Patch,
-    /// Cells along x and y.
-    shift: [isize; 2],
-    dims: [usize; 2],
-}
-
-impl Moved {
-    /// `None` when the tool meets nothing that is believed to be there.
-    fn of(belief: &Belief, plan: &FloorPlan, met: &[f32], track: &Track) -> Option<Self> {
-        let grid = &belief.grid;
-        let along = |cell: usize| track.along(grid.cell_center(grid.cell(cell)));
-        let first = (0..met.len())
-            .filter(|&cell| met[cell] >= SOLID && along(cell) >= 0.0)
-            .min_by(|&a, &b| along(a).total_cmp(&along(b)))?;
-        let patch = plan.patch(first, OBJECT_RADIUS_M);
-        let way_m = (track.length - AHEAD_M - along(first) + 0.5 * grid.voxel_m).max(0.0);
-        let dims = [grid.dims[0], grid.dims[1]];
-        let shift = std::array::from_fn(|axis| {
-            let at = |cell: &usize| [cell / dims[1], cell % dims[1]][axis] as isize;
-            let (low, high) =
-                patch.cells().iter().fold((isize::MAX, 0), |(low, high), cell| (low.min(at(cell)), high.max(at(cell))));
-            let wanted = (track.direction[axis] * way_m / grid.voxel_m).round() as isize;
-            wanted.clamp(-low, dims[axis] as isize - 1 - high)
-        });
-        Some(Self { patch, shift, dims })
+/// 1 near the tip's track, drawn out ahead; 0 far from it or behind its start.
+fn nearness(track: &Track, on_board: Point) -> f32 {
+    let along = track.along(on_board);
+    if along < 0.0 {
+        return 0.0;
     }
-
-    /// Where what comes to stand on a floor cell comes from.
-    fn source(&self, cell: usize) -> Option<usize> {
-        let x = (cell / self.dims[1]).checked_add_signed(-self.shift[0]).filter(|x| *x < self.dims[0])?;
-        let y = (cell % self.dims[1]).checked_add_signed(-self.shift[1]).filter(|y| *y < self.dims[1])?;
-        Some(x * self.dims[1] + y).filter(|&source| self.patch.contains(source))
-    }
-}
-
-/// The tip's way along the push, drawn out ahead.
-struct Track {
-    start: Point,
-    direction: Vector,
-    length: f32,
-}
-
-impl Track {
-    fn of(push: &SweptPush) -> Self {
-        let push = &push.push;
-        Self { start: push.start_point(), direction: push.direction(), length: push.length_m + AHEAD_M }
-    }
-
-    /// How far along the push a point is, metres; negative behind the start.
-    fn along(&self, on_board: Point) -> f32 {
-        Vector::new(on_board.x - self.start.x, on_board.y - self.start.y, 0.0).dot(&self.direction)
-    }
-
-    /// 1 near the track, 0 far from it or behind its start.
-    fn nearness(&self, on_board: Point) -> f32 {
-        let along = self.along(on_board);
-        if along < 0.0 {
-            return 0.0;
-        }
-        let on_track = self.start + self.direction * along.min(self.length);
-        let distance = (on_board.x - on_track.x).hypot(on_board.y - on_track.y);
-        ((FAR_M - distance) / (FAR_M - NEAR_M)).clamp(0.0, 1.0)
-    }
+    let on_track = track.start + track.direction * along.min(track.length + AHEAD_M);
+    let distance = (on_board.x - on_track.x).hypot(on_board.y - on_track.y);
+    ((FAR_M - distance) / (FAR_M - NEAR_M)).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

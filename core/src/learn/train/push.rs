@@ -6,9 +6,10 @@
 
 use super::TrainSettings;
 use super::state::{self, State};
+use crate::belief::{Carried, FloorPlan, SOLID};
 use crate::cnabu::{
-    Card, Cnabu, Evidence, Layout, LossForm, Mirror, PushConfig, PushNet, Pushed, WINDOW, observation_planes,
-    occupancy_loss, push_planes, semantics_loss, windows,
+    Card, Cnabu, Evidence, Layout, LossForm, Mirror, Numbers, PushConfig, PushNet, PushPlanes, Pushed, WINDOW,
+    Windowed, belief_of, observation_planes, occupancy_loss, push_planes, semantics_loss, windows,
 };
 use crate::learn::{Dataset, PushSample, PushedSample};
 use crate::rng::stream;
@@ -18,6 +19,7 @@ use rand::Rng;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 use tch::nn::VarStore;
 use tch::{Device, Kind, Tensor};
 
@@ -25,9 +27,10 @@ use tch::{Device, Kind, Tensor};
 const SUBS: usize = 4;
 /// Memory for beliefs that are kept, bytes.
 const BELIEFS_BYTES: usize = 6 << 30;
-/// How much a floor cell that does not change counts beside one that does: the posterior is gated with the probability of
-/// change, so what is wanted is the prediction given that the cell changes.
-const UNCHANGED: f64 = 0.1;
+/// How much a floor cell that does not change counts beside one that does. Next to nothing: the posterior is gated with the
+/// probability of change, so what is wanted is the prediction given that the cell changes. (With 0.1 three quarters of the
+/// loss were of unchanged cells, the prediction was hedged towards them, and the gate hedged it once more.)
+const UNCHANGED: f64 = 1e-3;
 /// Weight of the consistency term.
 const CONSISTENCY: f64 = 0.01;
 
@@ -145,10 +148,13 @@ impl PushTrainer {
             let (at, mirrored) = (rng.random_range(0..data.len()), rng.random());
             let sample = data.get(at)?;
             if !sample.pushes.is_empty() {
-                let evidence = self.beliefs.of(&self.layout, at, &sample, observe);
-                let (mirror, evidence) =
-                    if mirrored { (Mirror::X, evidence.mirrored()) } else { (Mirror::No, evidence) };
-                scenes.push(Scene::new(&self.layout, &sample, mirror, evidence));
+                let mirror = if mirrored { Mirror::X } else { Mirror::No };
+                scenes.push(Scene::new(
+                    &self.layout,
+                    &sample,
+                    mirror,
+                    &self.beliefs.of(&self.layout, at, &sample, observe),
+                ));
             }
         }
         let device = self.store.device();
@@ -159,11 +165,18 @@ impl PushTrainer {
             semantics: stacked(&|scene| windows(&scene.evidence.semantics, &scene.xs)),
         };
         let put = |part: &dyn Fn(&Scene) -> Tensor| stacked(part).to_device(device);
-        let (swept, marks) = (put(&|s| s.swept.shallow_clone()), put(&|s| s.marks.shallow_clone()));
+        let pushes = PushPlanes {
+            swept: put(&|s| s.pushes.swept.shallow_clone()),
+            marks: put(&|s| s.pushes.marks.shallow_clone()),
+            arriving: Evidence {
+                occupancy: put(&|s| s.pushes.arriving.occupancy.shallow_clone()),
+                semantics: put(&|s| s.pushes.arriving.semantics.shallow_clone()),
+            },
+        };
         let (truth, classes) = (put(&|s| s.truth.shallow_clone()), put(&|s| s.classes.shallow_clone()));
         let changed = put(&|s| s.changed.shallow_clone());
 
-        let pushed = self.net.forward(&stem, &prior, &swept, &marks);
+        let pushed = self.net.forward(&stem, &prior, &pushes);
         let ramp = (self.state.updates as f64 / self.settings.kl_ramp.max(1) as f64).min(1.0);
         let (loss, parts) = self.loss(&pushed, &prior, &Targets { truth, classes, changed }, ramp, &mut rng);
         if ![parts.occupancy, parts.semantics, parts.change].iter().all(|part| part.is_finite()) {
@@ -223,34 +236,56 @@ impl PushTrainer {
     }
 }
 
-/// What the frozen sigma_o makes of samples: as long as training lasts it stays the same, and takes most of an update's
-/// time. Kept with 16 bits up to [`BELIEFS_BYTES`]; what does not fit is made again.
-#[derive(Debug, Default)]
-struct Beliefs {
-    kept: HashMap<usize, Evidence>,
-    bytes: usize,
+/// What the frozen sigma_o makes of a sample, and what its pushes carry along according to that.
+#[derive(Debug)]
+struct Prior {
+    evidence: Evidence,
+    carried: Arc<[Option<Carried>]>,
 }
 
-impl Beliefs {
-    /// The belief after the views of sample `number`, not mirrored.
-    fn of(&mut self, layout: &Layout, number: usize, sample: &PushSample, observe: &Cnabu) -> Evidence {
-        if let Some(kept) = self.kept.get(&number) {
-            return kept.to_kind(Kind::Float);
-        }
+impl Prior {
+    /// After the views of `sample`, with evidence rounded to 16 bits.
+    fn of(layout: &Layout, sample: &PushSample, observe: &Cnabu) -> Self {
         let mut evidence = Evidence::uniform(1, layout.pixels().map(|n| n as i64), observe.device());
         for view in &sample.views {
             let (observed, labels) = observation_planes(layout, &view.observation, Mirror::No);
             evidence = observe.observe_planes(&evidence, &observed, &labels);
         }
-        let half = evidence.to_kind(Kind::Half);
-        let bytes = 2 * (half.occupancy.numel() + half.semantics.numel());
-        // Rounded now as later: a run that is resumed is the run that was not stopped.
-        let rounded = half.to_kind(Kind::Float);
+        let evidence = evidence.to_kind(Kind::Half);
+        let belief = belief_of(layout, &evidence.to_kind(Kind::Float));
+        let plan = FloorPlan::new(&belief, SOLID);
+        let carried = sample.pushes.iter().map(|pushed| Carried::by(&pushed.push, &belief, &plan)).collect();
+        Self { evidence, carried }
+    }
+
+    /// The same with evidence of 32 bits: rounded, so that a run that is resumed is the run that was not stopped.
+    fn single(&self) -> Self {
+        Self { evidence: self.evidence.to_kind(Kind::Float), carried: Arc::clone(&self.carried) }
+    }
+}
+
+/// The priors of the samples seen so far: as long as training lasts they stay the same, and take most of an update's time.
+/// Kept up to [`BELIEFS_BYTES`]; what does not fit is made again.
+#[derive(Debug, Default)]
+struct Beliefs {
+    kept: HashMap<usize, Prior>,
+    bytes: usize,
+}
+
+impl Beliefs {
+    /// The prior of sample `number`, not mirrored.
+    fn of(&mut self, layout: &Layout, number: usize, sample: &PushSample, observe: &Cnabu) -> Prior {
+        if let Some(kept) = self.kept.get(&number) {
+            return kept.single();
+        }
+        let prior = Prior::of(layout, sample, observe);
+        let single = prior.single();
+        let bytes = 2 * (prior.evidence.occupancy.numel() + prior.evidence.semantics.numel());
         if self.bytes + bytes <= BELIEFS_BYTES {
             self.bytes += bytes;
-            self.kept.insert(number, half);
+            self.kept.insert(number, prior);
         }
-        rounded
+        single
     }
 }
 
@@ -265,25 +300,38 @@ struct Targets {
 struct Scene {
     evidence: Evidence,
     xs: Vec<Range<usize>>,
-    swept: Tensor,
-    marks: Tensor,
+    pushes: PushPlanes,
     truth: Tensor,
     classes: Tensor,
     changed: Tensor,
 }
 
 impl Scene {
-    fn new(layout: &Layout, sample: &PushSample, mirror: Mirror, evidence: Evidence) -> Self {
+    fn new(layout: &Layout, sample: &PushSample, mirror: Mirror, prior: &Prior) -> Self {
+        let evidence = match mirror {
+            Mirror::X => prior.evidence.mirrored(),
+            Mirror::No => Evidence {
+                occupancy: prior.evidence.occupancy.shallow_clone(),
+                semantics: prior.evidence.semantics.shallow_clone(),
+            },
+        };
         let y = layout.pixels()[1] as i64;
         let around = |pushed: &PushedSample| {
             let x = layout.around(&pushed.push.push, WINDOW);
             if mirror == Mirror::X { layout.mirrored(&x) } else { x }
         };
         let xs: Vec<Range<usize>> = sample.pushes.iter().map(around).collect();
-        let windowed: Vec<_> = sample.pushes.iter().map(|pushed| &pushed.push).zip(xs.iter().cloned()).collect();
-        let (swept, marks) = push_planes(layout, &windowed, mirror);
+        let carried = prior.carried.iter().map(Option::as_ref);
+        let windowed: Vec<_> = sample
+            .pushes
+            .iter()
+            .zip(carried)
+            .zip(&xs)
+            .map(|((pushed, carried), x)| Windowed { push: &pushed.push, carried, x: x.clone() })
+            .collect();
+        let pushes = push_planes(layout, &Numbers::of(&evidence), &windowed, mirror);
         let plane = xs[0].len() * layout.pixels()[1];
-        let levels = swept.size()[1] as usize;
+        let levels = pushes.swept.size()[1] as usize;
         let (mut truth, mut classes, mut changed) = (Vec::new(), Vec::new(), Vec::new());
         for (pushed, x) in sample.pushes.iter().zip(&xs) {
             let mut after = vec![0.0_f32; levels * plane];
@@ -293,14 +341,14 @@ impl Scene {
             layout.put_classes(&pushed.labels, mirror, x.clone(), &mut labels);
             classes.extend(labels);
             let mut mask = vec![0.0_f32; SUBS * plane];
-            layout.put_cells(&sample.changed_by(pushed), mirror, x.clone(), &mut mask);
+            let by = sample.changed_by(pushed);
+            layout.put_cells(|cell| by[cell], mirror, x.clone(), &mut mask);
             changed.extend(mask);
         }
         let shape = |channels: usize| [xs.len() as i64, channels as i64, xs[0].len() as i64, y];
         Self {
             evidence,
-            swept,
-            marks,
+            pushes,
             truth: Tensor::from_slice(&truth).reshape(shape(levels)),
             classes: Tensor::from_slice(&classes).reshape(shape(SUBS)).unsqueeze(1),
             changed: Tensor::from_slice(&changed).reshape(shape(SUBS)),

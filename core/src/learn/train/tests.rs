@@ -147,6 +147,21 @@ fn weights_go_to_a_file_and_come_back_and_bad_ones_are_told() {
     drop(other.remove(3));
     crate::cnabu::write_tensors(&path, &other).expect("written");
     refused(&path, "is missing");
+    crate::cnabu::write_tensors(&path, &weights).expect("written");
+    let whole = std::fs::read(&path).expect("read");
+    for length in [0, 7, 8, 100, whole.len() / 2, whole.len() - 1] {
+        std::fs::write(&path, &whole[..length]).expect("written");
+        refused(&path, "damaged");
+    }
+    let mut header = whole.clone();
+    header[..8].copy_from_slice(&u64::MAX.to_le_bytes());
+    std::fs::write(&path, header).expect("written");
+    refused(&path, "damaged");
+    let text = String::from_utf8_lossy(&whole[8..200]).find("[0,").expect("the first tensor's bytes");
+    let mut beyond = whole.clone();
+    beyond[8 + text + 1] = b'9';
+    std::fs::write(&path, beyond).expect("written");
+    refused(&path, "damaged");
     std::fs::write(&path, b"no weights at all").expect("written");
     refused(&path, "damaged");
     let text = std::fs::read_to_string(crate::cnabu::card_path(&path)).expect("read");

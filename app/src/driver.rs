@@ -7,7 +7,7 @@
 use crate::figure::{Moment, Summary, summary};
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
-use nudge_core::belief::{Belief, BeliefUpdate, Classical};
+use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical};
 use nudge_core::cnabu;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Observer, Overwrite, StepOutcome, resume};
 use nudge_core::plan::{Decision, PolicyKind};
@@ -158,7 +158,7 @@ impl Driver {
 }
 
 /// The names of the belief updates.
-pub const BELIEFS: [&str; 2] = ["classical", "cnabu"];
+pub const BELIEFS: [&str; 2] = [CLASSICAL, CNABU];
 
 /// The belief update that a policy runs with: the one named, or the policy's own. Says in the second value what a
 /// person should know about the choice.
@@ -167,8 +167,8 @@ pub const BELIEFS: [&str; 2] = ["classical", "cnabu"];
 /// [`Error::Usage`] for a name that is unknown, or asked for but not there; what is wrong with the networks' weights.
 pub fn belief_update(named: Option<&str>, policy: PolicyKind) -> Result<(Arc<dyn BeliefUpdate>, Option<String>)> {
     match named.unwrap_or_else(|| policy.default_belief()) {
-        "classical" => Ok((Arc::new(Classical), None)),
-        "cnabu" => match (networks(), named) {
+        CLASSICAL => Ok((Arc::new(Classical), None)),
+        CNABU => match (networks(), named) {
             (Ok(update), _) => Ok((update, None)),
             // Broken weights are an error even for who did not ask for them; that there are none is not.
             (Err(NoNetworks::Broken(error)), _) => Err(error),

@@ -30,7 +30,7 @@ use nudge_core::camera::{Image, View, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
 use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
 use nudge_core::grid::{Grid, VoxelSet};
-use nudge_core::plan::{Action, gain_field};
+use nudge_core::plan::{Action, PlannerSettings, gain_field};
 use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
@@ -53,10 +53,8 @@ pub struct Setting<'a> {
     pub views: &'a ViewArray,
     /// Number of actions in all.
     pub budget: usize,
-    /// Weight of the disturbance term.
-    pub gamma: f32,
-    /// How many times what looking does a push has to promise.
-    pub patience: f32,
+    /// The planner's numbers.
+    pub planner: &'a PlannerSettings,
     /// The arm before the shelf, where there is one to show.
     pub arm: &'a ArmTool,
     /// Views that its hand cannot be at.
@@ -330,7 +328,7 @@ impl Recorder {
         self.log(paths::GAIN_CHOSEN, &floor::chosen_views(setting.views, decision))?;
         self.log_or_clear(paths::GAIN_VOXELS, (!nats.is_empty()).then(|| voxels::gains(grid, nats)))?;
         let any = !decision.candidates.is_empty();
-        self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision, setting.gamma)))?;
+        self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision, setting.planner.gamma)))?;
         match (record.action, &outcome.image) {
             (Action::Look { view }, Some(image)) => self.look(setting, view, image)?,
             _ => {
@@ -433,8 +431,7 @@ fn setting(episode: &Episode) -> Setting<'_> {
         catalog: episode.catalog(),
         views: episode.views(),
         budget: record.config.budget,
-        gamma: record.config.planner.gamma,
-        patience: record.config.planner.patience,
+        planner: &record.config.planner,
         arm: episode.arm(),
         unreachable: episode.unreachable_views(),
     }

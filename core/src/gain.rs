@@ -31,6 +31,7 @@
 
 mod code;
 mod field;
+mod open;
 mod pair;
 mod ray;
 mod rescore;
@@ -39,6 +40,7 @@ mod skip;
 mod tests;
 
 pub use field::GainField;
+pub use open::{Openings, gain_together};
 pub use pair::{ViewPair, best_pair};
 pub use rescore::RayGains;
 

@@ -16,7 +16,7 @@ pub use rule::{
 pub use weigh::{COARSE_VIEWS, disturbance};
 
 use crate::arm::{ArmTool, Push, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, CERTAIN, COMPLETE_SHARE};
+use crate::belief::{Belief, BeliefUpdate, CERTAIN, CNABU, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::gain::GainField;
 use crate::grid::VoxelSet;
@@ -49,9 +49,9 @@ pub enum Reason {
     PushTellsMore,
     /// The view that made the last push worth it.
     ViewOfPush,
-    /// No push in the first three steps.
+    /// No push in the first steps.
     TooEarly,
-    /// No push in the last step, or steps.
+    /// No push in the last step, or the last steps.
     LastStep,
     /// No push right after a push.
     JustPushed,
@@ -76,10 +76,11 @@ pub struct CandidateRecord {
     /// Why it was not a candidate, if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rejection: Option<Rejection>,
-    /// Best single-view gain under the predicted belief, nats; `None` if rejected or not weighed. The best push's is
-    /// exact, the others' come from fewer views and rays and are scaled to the same number of rays.
+    /// What the push is worth, nats; `None` if rejected or not weighed. Where all voxels count it is the best single-view
+    /// gain under the predicted belief: the best push's is exact, the others' come from fewer views and rays and are
+    /// scaled to the same number of rays. Where only unseen voxels count it is what the push opens.
     pub gain: Option<f32>,
-    /// The view with that gain.
+    /// The best view after it, where it was looked for: of all candidates where it tells the gain, else of the best.
     pub view: Option<ViewId>,
     /// `min(0, H_s(belief) - H_s(predicted))`, nats.
     pub reg: Option<f32>,
@@ -95,9 +96,9 @@ pub struct Decision {
     pub action: Action,
     /// Why.
     pub reason: Reason,
-    /// Gain of the best pair of views, nats.
+    /// Gain of the best pair of views, nats ([`Counted`] says of what).
     pub igv: f32,
-    /// Gain of the best push, nats; 0 when none was weighed.
+    /// Worth of the best push, nats; 0 when none was weighed.
     pub igm: f32,
     /// Disturbance of the best push, nats, at most 0.
     pub reg: f32,
@@ -199,15 +200,16 @@ impl Situation<'_> {
     }
 }
 
-/// Which voxels a view's gain counts.
+/// Which voxels a view's gain counts, and by what a push is worth it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Counted {
-    /// All that the view may see, as in the paper.
+    /// All that the view may see; a push is worth the best single view after it. As in the paper.
     #[default]
     All,
     /// Those that no look has seen yet, or not since a push may have changed them. What a push would make uncertain of
-    /// what was seen is no gain.
+    /// what was seen is no gain; it is worth what it opens to all views together ([`crate::gain::Openings`]). IGV and IGM
+    /// count each voxel once.
     Unseen,
 }
 
@@ -218,7 +220,23 @@ impl Counted {
     /// What serves a belief best, by the belief update's name: the networks stay unsure of edges however often they are
     /// looked at, so there only unseen voxels count.
     pub fn of_belief(name: &str) -> Self {
-        if name == "cnabu" { Self::Unseen } else { Self::All }
+        if name == CNABU { Self::Unseen } else { Self::All }
+    }
+
+    /// What IGV is, as the end of a sentence.
+    pub fn of_looks(self) -> &'static str {
+        match self {
+            Self::All => "information gain of the best two views together",
+            Self::Unseen => "what the best two views together would see of what no look has seen",
+        }
+    }
+
+    /// What IGM is, as the end of a sentence.
+    pub fn of_pushes(self) -> &'static str {
+        match self {
+            Self::All => "the best view after the best push",
+            Self::Unseen => "what the best push opens to all views together",
+        }
     }
 }
 

@@ -8,6 +8,7 @@ use crate::bench::{
 use crate::driver::belief_update;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
+use nudge_core::belief::{CLASSICAL, CNABU};
 use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
 use nudge_core::scene::Catalog;
 use std::collections::BTreeMap;
@@ -145,7 +146,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         return Err(Error::Usage("--budget must be at least one action".to_owned()).into());
     }
     // One setting for the whole bench, so that its policies compare.
-    let belief = if policies.iter().any(|plan| plan.belief == "cnabu") { "cnabu" } else { "classical" };
+    let belief = if policies.iter().any(|plan| plan.belief == CNABU) { CNABU } else { CLASSICAL };
     let (sets, broken) = load_sets(&args.sets, &Catalog::standard())?;
     nudge_core::camera::ViewArray::named(&args.views)?;
     Ok(Plan {

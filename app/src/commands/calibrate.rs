@@ -4,7 +4,7 @@ use crate::figure::{Calibrated, PIXELS_PER_UNIT, calibration, escape};
 use crate::picture;
 use indicatif::ProgressBar;
 use nudge_core::Error;
-use nudge_core::belief::{BeliefUpdate, Classical};
+use nudge_core::belief::{BeliefUpdate, CLASSICAL, CNABU, Classical};
 use nudge_core::cnabu::{self, Scored};
 use nudge_core::files::write_atomically;
 use nudge_core::learn::{Dataset, MapSample, PushSample, evaluate, evaluate_pushes};
@@ -83,8 +83,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut predictions: Vec<(String, Scores)> = Vec::new();
     for name in &args.beliefs {
         let update: Arc<dyn BeliefUpdate> = match name.as_str() {
-            "classical" => Arc::new(Classical),
-            "cnabu" => {
+            CLASSICAL => Arc::new(Classical),
+            CNABU => {
                 let directory = args.models.clone().or_else(cnabu::models_dir);
                 let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
                 cnabu::load(&directory.ok_or_else(missing)?)?

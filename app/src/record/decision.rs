@@ -2,7 +2,7 @@
 
 use super::Setting;
 use nudge_core::episode::StepRecord;
-use nudge_core::plan::{Action, CandidateRecord, Decision, Reason};
+use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, Reason};
 use nudge_core::push::Rejection;
 use nudge_core::score::Scores;
 use std::fmt::Write as _;
@@ -80,8 +80,8 @@ pub(crate) fn reason(reason: Reason) -> &'static str {
         Reason::LookTellsMore => "looking tells more",
         Reason::PushTellsMore => "pushing tells more",
         Reason::ViewOfPush => "the view that made the push worth it",
-        Reason::TooEarly => "no push in the first three steps",
-        Reason::LastStep => "no push in the last step",
+        Reason::TooEarly => "no push in the first steps",
+        Reason::LastStep => "no push in the last steps",
         Reason::JustPushed => "no push right after a push",
         Reason::MapComplete => "the map is complete",
         Reason::Dropped => "an object was dropped, so no more pushes",
@@ -103,7 +103,7 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     );
     weighed(&mut page, decision, setting);
     views(&mut page, setting, decision);
-    pushes(&mut page, decision, setting.gamma);
+    pushes(&mut page, decision, setting.planner.gamma);
     let scores = &record.scores;
     let _ = write!(
         page,
@@ -118,18 +118,18 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
 }
 
 fn weighed(page: &mut String, decision: &Decision, setting: &Setting<'_>) {
-    let (gamma, patience) = (setting.gamma, setting.patience);
+    let PlannerSettings { counted, gamma, patience, .. } = *setting.planner;
     let sign = |holds: bool| if holds { " ◀" } else { "" };
     let push = decision.igm + gamma * decision.reg;
     let (looks, pushed) = (matches!(decision.action, Action::Look { .. }), decision.best_push.is_some());
     page.push_str("| weighed | nats |\n|:--|--:|\n");
-    let _ = writeln!(page, "| look: IGV, the best two views{} | {:.1} |", sign(looks), decision.igv);
+    let _ = writeln!(page, "| look: IGV, {}{} | {:.1} |", counted.of_looks(), sign(looks), decision.igv);
     if pushed {
         if patience != 1.0 {
             let _ = writeln!(page, "|    patience·IGV, what a push has to promise | {:.1} |", patience * decision.igv);
         }
         let _ = writeln!(page, "| push: IGM + γ·Reg{} | {push:.1} |", sign(!looks));
-        let _ = writeln!(page, "|    IGM, the best view after the best push | {:.1} |", decision.igm);
+        let _ = writeln!(page, "|    IGM, {} | {:.1} |", counted.of_pushes(), decision.igm);
         let _ = writeln!(page, "|    γ·Reg, what it would blur | {:.1} |", gamma * decision.reg);
     }
     page.push('\n');
@@ -233,6 +233,40 @@ pub(crate) fn thousands(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixture;
+    use nudge_core::arm::{ArmTool, Push};
+
+    #[test]
+    fn the_page_of_a_push_shows_what_it_had_to_promise() {
+        let played = fixture::play(4);
+        let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 };
+        let (mut record, arm) = (played.record.steps[3].clone(), ArmTool::standard(played.record.scene.shelf));
+        record.decision = Decision {
+            action: Action::Push(push),
+            reason: Reason::PushTellsMore,
+            igv: 30.0,
+            igm: 400.0,
+            reg: -50.0,
+            best_push: Some(0),
+            ..record.decision
+        };
+        let page = |planner: &PlannerSettings| {
+            let setting = Setting {
+                shelf: &played.record.scene.shelf,
+                catalog: &played.catalog,
+                views: &played.views,
+                budget: 4,
+                planner,
+                arm: &arm,
+                unreachable: &[],
+            };
+            markdown(&setting, &record)
+        };
+        let patient = PlannerSettings { patience: 10.0, ..PlannerSettings::default() };
+        let with = page(&patient);
+        assert!(with.contains("what a push has to promise | 300.0 |") && with.contains("γ·Reg ◀ | 390.0 |"), "{with}");
+        assert!(!page(&PlannerSettings::default()).contains("has to promise"), "the paper's rule compares IGV itself");
+    }
 
     #[test]
     fn numbers_are_grouped() {

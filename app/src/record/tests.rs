@@ -25,8 +25,7 @@ fn a_recording_stays_small_and_names_its_entities() {
         catalog: &played.catalog,
         views: &played.views,
         budget: steps,
-        gamma: 0.2,
-        patience: 1.0,
+        planner: &PlannerSettings::default(),
         arm: &arm,
         unreachable: &[],
     };

@@ -121,8 +121,7 @@ fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Wa
         catalog: &session.setup.catalog,
         views: &session.setup.views,
         budget: record.config.budget,
-        gamma: record.config.planner.gamma,
-        patience: record.config.planner.patience,
+        planner: &record.config.planner,
     };
     let mut recorder = Recorder::begin(path, &record::title(record), &setting)?;
     for (done, moment) in session.moments.iter().enumerate() {

@@ -4,7 +4,7 @@ use super::directory::EpisodeDir;
 use super::machine::Episode;
 use super::npz::StoredTruth;
 use super::record::{EpisodeRecord, StepRecord};
-use crate::belief::BeliefUpdate;
+use crate::belief::{BeliefUpdate, CLASSICAL};
 use crate::plan::Reason;
 use crate::scene::Catalog;
 use crate::{Error, Result};
@@ -90,7 +90,7 @@ pub fn replay(
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<ReplayReport> {
     let logged = directory.record()?;
-    let tolerance = if logged.config.belief == "classical" { 0.0 } else { TOLERANCE };
+    let tolerance = if logged.config.belief == CLASSICAL { 0.0 } else { TOLERANCE };
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
     let mut comparison = Comparison::new(tolerance);
     comparison.prior(&logged, episode.record());

@@ -45,6 +45,11 @@ pub(super) struct Ray {
 
 /// What is done with the voxels that a ray visits.
 pub(super) trait Tally {
+    /// What the codes mean to the ray.
+    fn matter(&self) -> &'static [Matter; 256] {
+        &MATTER
+    }
+
     /// A voxel at a padded position, its entropy in nats, and the transmittance with which the ray arrives.
     fn visit(&mut self, index: usize, information: f32, transmittance: f32);
 }
@@ -210,7 +215,7 @@ impl Ray {
     #[inline(always)]
     pub(super) fn walk(mut self, field: &GainField, tally: &mut impl Tally) {
         let codes = &field.codes[..];
-        let matter: &[Matter; 256] = &MATTER;
+        let matter = tally.matter();
         let mut transmittance = 1.0_f32;
         let mut visit = |index: usize, code: u8| {
             let Matter { information, pass } = matter[usize::from(code)];

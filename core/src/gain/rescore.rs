@@ -28,17 +28,17 @@ struct ViewRays {
 /// The smallest box of voxels that holds a ray from its entry to its end. A ray is monotone, so it is the box of the
 /// two.
 #[derive(Clone, Copy)]
-struct Reached {
-    min: [u16; 3],
-    max: [u16; 3],
+pub(super) struct Reached {
+    pub(super) min: [u16; 3],
+    pub(super) max: [u16; 3],
 }
 
 impl Reached {
     /// A ray that does not enter.
-    const NOTHING: Self = Self { min: [u16::MAX; 3], max: [0; 3] };
+    pub(super) const NOTHING: Self = Self { min: [u16::MAX; 3], max: [0; 3] };
 
     #[inline(always)]
-    fn touches(&self, changed: &Self) -> bool {
+    pub(super) fn touches(&self, changed: &Self) -> bool {
         (0..3).all(|axis| self.min[axis] <= changed.max[axis] && changed.min[axis] <= self.max[axis])
     }
 }
@@ -114,7 +114,7 @@ impl Tally for GainAndEnd<'_> {
 
 impl Reached {
     /// The box from a ray's entry to the padded position of its last voxel, which may lie in the border.
-    fn between(field: &GainField, entering: &Ray, last: usize) -> Self {
+    pub(super) fn between(field: &GainField, entering: &Ray, last: usize) -> Self {
         let layout = &field.layout;
         let [width, depth, height] = layout.grid.dims;
         let [plane, line, _] = layout.stride;

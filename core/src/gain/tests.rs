@@ -1,7 +1,7 @@
 //! What a gain is, against paper and against a slow computation of its own.
 
 mod change;
-mod support;
+pub(super) mod support;
 
 use super::*;
 use crate::belief::{Belief, PushPrediction, bernoulli_entropy};

@@ -4,7 +4,7 @@ use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated};
 use super::weigh::{Weighed, random_push, weigh_pushes};
 use super::{Action, Counted, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field};
 use crate::camera::ViewId;
-use crate::gain::{RayDensity, best_pair, gain_of_views};
+use crate::gain::{RayDensity, best_pair, gain_of_views, gain_together};
 use crate::rng::stream;
 use rand::Rng;
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
     let mut decision = Decision {
         action: Action::Look { view: best_look },
         reason: Reason::Schedule,
-        igv: pair.map_or(0.0, |pair| pair.total()),
+        igv: 0.0,
         igm: 0.0,
         reg: 0.0,
         pair: pair.map_or_else(Vec::new, |pair| std::iter::once(pair.first).chain(pair.second).collect()),
@@ -37,8 +37,12 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         best_push: None,
         motion: None,
     };
+    decision.igv = match settings.counted {
+        Counted::All => pair.map_or(0.0, |pair| pair.total()),
+        Counted::Unseen => gain_together(&field, views, &decision.pair, RayDensity::gapless(field.grid(), views)),
+    };
     let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
-    let guard = || push_guard(history, situation.budget, complete(), settings.quiet_steps, settings.closing_steps);
+    let guard = || push_guard(history, situation.budget, complete(), settings);
     match policy {
         PolicyKind::Mem => {
             if let (Counted::All, true, Some(view)) = (settings.counted, history.just_pushed(), history.view_of_push) {

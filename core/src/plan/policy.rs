@@ -1,5 +1,6 @@
 //! The policies by name, and what each of them stands for.
 
+use crate::belief::{CLASSICAL, CNABU};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -74,8 +75,8 @@ impl PolicyKind {
     /// Name of the belief update that the policy is published with.
     pub fn default_belief(self) -> &'static str {
         match self {
-            Self::Random => "classical",
-            _ => "cnabu",
+            Self::Random => CLASSICAL,
+            _ => CNABU,
         }
     }
 }
@@ -124,7 +125,7 @@ mod tests {
         let blind: Vec<PolicyKind> = PolicyKind::ALL.into_iter().filter(|policy| !policy.predicts_pushes()).collect();
         assert_eq!(blind, [PolicyKind::RandomPush5Blind, PolicyKind::RandomViewPush5]);
         let classical: Vec<PolicyKind> =
-            PolicyKind::ALL.into_iter().filter(|policy| policy.default_belief() == "classical").collect();
+            PolicyKind::ALL.into_iter().filter(|policy| policy.default_belief() == CLASSICAL).collect();
         assert_eq!(classical, [PolicyKind::Random]);
     }
 }

@@ -1,6 +1,6 @@
 //! The rule and its guards, as functions of plain numbers.
 
-use super::{History, Reason};
+use super::{History, PlannerSettings, Reason};
 
 /// The first steps, in which nothing is pushed: the map is still too empty to push by.
 pub const QUIET_STEPS: usize = 3;
@@ -22,22 +22,16 @@ pub fn look_or_push(igv: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
     if igv > igm + gamma * reg { Reason::LookTellsMore } else { Reason::PushTellsMore }
 }
 
-/// Why no push is allowed in the next step, or `None` if one is. Of several reasons the lasting ones are named first.
-/// In the first `quiet_steps` steps, by default [`QUIET_STEPS`], nothing is pushed, nor in the last `closing_steps`.
-pub fn push_guard(
-    history: &History,
-    budget: usize,
-    map_complete: bool,
-    quiet_steps: usize,
-    closing_steps: usize,
-) -> Option<Reason> {
+/// Why no push is allowed in the next step of `budget`, or `None` if one is. Of several reasons the lasting ones are named
+/// first.
+pub fn push_guard(history: &History, budget: usize, map_complete: bool, settings: &PlannerSettings) -> Option<Reason> {
     let step = history.actions.len();
     let guards = [
         (history.dropped, Reason::Dropped),
         (map_complete, Reason::MapComplete),
-        (step < quiet_steps, Reason::TooEarly),
+        (step < settings.quiet_steps, Reason::TooEarly),
         (history.just_pushed(), Reason::JustPushed),
-        (step + closing_steps >= budget, Reason::LastStep),
+        (step + settings.closing_steps >= budget, Reason::LastStep),
     ];
     guards.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
 }
@@ -54,7 +48,7 @@ mod tests {
     use super::*;
     use crate::arm::Push;
     use crate::camera::ViewId;
-    use crate::plan::Action;
+    use crate::plan::{Action, Counted};
 
     const LOOK: Action = Action::Look { view: ViewId(0) };
     const PUSH: Action = Action::Push(Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 });
@@ -74,47 +68,42 @@ mod tests {
         assert_eq!(look_or_push(90.0, 100.0, -40.0, 0.2), Reason::PushTellsMore);
     }
 
+    /// The guard of 20 steps after some actions.
+    fn guard(actions: &[Action], settings: &PlannerSettings) -> Option<Reason> {
+        push_guard(&after(actions), 20, false, settings)
+    }
+
     #[test]
     fn no_push_in_the_first_three_steps_and_none_in_the_last() {
+        let settings = PlannerSettings::default();
         for step in 0..3 {
-            assert_eq!(
-                push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS, CLOSING_STEPS),
-                Some(Reason::TooEarly)
-            );
+            assert_eq!(guard(&vec![LOOK; step], &settings), Some(Reason::TooEarly));
         }
         for step in 3..19 {
-            assert_eq!(push_guard(&after(&vec![LOOK; step]), 20, false, QUIET_STEPS, CLOSING_STEPS), None);
+            assert_eq!(guard(&vec![LOOK; step], &settings), None);
         }
-        assert_eq!(push_guard(&after(&[LOOK; 19]), 20, false, QUIET_STEPS, CLOSING_STEPS), Some(Reason::LastStep));
-        assert_eq!(push_guard(&after(&[LOOK; 15]), 20, false, QUIET_STEPS, RESTORING_STEPS), None);
-        let closing = push_guard(&after(&[LOOK; 16]), 20, false, QUIET_STEPS, RESTORING_STEPS);
-        assert_eq!(closing, Some(Reason::LastStep), "looks that make good what a push disturbs");
-        assert_eq!(
-            push_guard(&after(&[LOOK; 3]), 20, false, 4, CLOSING_STEPS),
-            Some(Reason::TooEarly),
-            "a longer quiet time"
-        );
+        assert_eq!(guard(&[LOOK; 19], &settings), Some(Reason::LastStep));
+        let unseen = settings.counting(Counted::Unseen);
+        assert_eq!(guard(&[LOOK; 15], &unseen), None);
+        assert_eq!(guard(&[LOOK; 16], &unseen), Some(Reason::LastStep), "looks that make good what a push disturbs");
+        let quiet = PlannerSettings { quiet_steps: 4, ..settings };
+        assert_eq!(guard(&[LOOK; 3], &quiet), Some(Reason::TooEarly), "a longer quiet time");
     }
 
     #[test]
     fn no_push_twice_in_a_row() {
-        assert_eq!(
-            push_guard(&after(&[LOOK, LOOK, LOOK, PUSH]), 20, false, QUIET_STEPS, CLOSING_STEPS),
-            Some(Reason::JustPushed)
-        );
-        assert_eq!(push_guard(&after(&[LOOK, LOOK, LOOK, PUSH, LOOK]), 20, false, QUIET_STEPS, CLOSING_STEPS), None);
+        let settings = PlannerSettings::default();
+        assert_eq!(guard(&[LOOK, LOOK, LOOK, PUSH], &settings), Some(Reason::JustPushed));
+        assert_eq!(guard(&[LOOK, LOOK, LOOK, PUSH, LOOK], &settings), None);
     }
 
     #[test]
     fn no_push_on_a_complete_map_nor_after_a_drop() {
-        assert_eq!(push_guard(&after(&[LOOK; 5]), 20, true, QUIET_STEPS, CLOSING_STEPS), Some(Reason::MapComplete));
+        let settings = PlannerSettings::default();
+        assert_eq!(push_guard(&after(&[LOOK; 5]), 20, true, &settings), Some(Reason::MapComplete));
         let dropped = History { dropped: true, ..after(&[LOOK; 5]) };
-        assert_eq!(push_guard(&dropped, 20, false, QUIET_STEPS, CLOSING_STEPS), Some(Reason::Dropped));
-        assert_eq!(
-            push_guard(&dropped, 20, true, QUIET_STEPS, CLOSING_STEPS),
-            Some(Reason::Dropped),
-            "the lasting reason is named"
-        );
+        assert_eq!(push_guard(&dropped, 20, false, &settings), Some(Reason::Dropped));
+        assert_eq!(push_guard(&dropped, 20, true, &settings), Some(Reason::Dropped), "the lasting reason is named");
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! What pushes are worth: IGM and Reg of every candidate.
 
-use super::{CandidateRecord, PlannerSettings, Situation};
+use super::{CandidateRecord, Counted, PlannerSettings, Situation};
 use crate::arm::PushMotion;
 use crate::belief::{Belief, PushPrediction, SweptPush};
-use crate::camera::ViewId;
-use crate::gain::{GainField, RayDensity, RayGains, gain_of_views};
+use crate::camera::{ViewArray, ViewId};
+use crate::gain::{GainField, Openings, RayDensity, RayGains, gain_of_views};
 use crate::push::{Candidate, sample};
 use crate::rng::{ChaCha8Rng, stream};
+use rayon::prelude::*;
 
 /// About how many views rank the candidates: every 5th of 300, all of an array that has fewer than twice as many.
 pub const COARSE_VIEWS: usize = 60;
@@ -27,10 +28,12 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
     prediction.semantic_entropy_drop(belief).min(0.0) as f32
 }
 
-/// Draws candidates and weighs the feasible ones: a coarse ranking first, then the winner with all views and rays.
+/// Draws candidates and weighs the feasible ones.
 ///
-/// A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones. A push clears the
-/// list of used views, so every view counts.
+/// Where all voxels count, a push is worth the best single view after it: a coarse ranking first, then the winner with all
+/// views and rays. A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones. A push
+/// clears the list of used views, so every view counts. Where only unseen voxels count, a push is worth what it opens to
+/// the coarse views together ([`Openings`]).
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
     let drawn = sample(belief, situation.arm, settings.candidates, &mut push_stream(situation));
@@ -46,15 +49,12 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
     let offered = situation.offered();
     let ids = |step: usize| offered.iter().copied().step_by(step).collect::<Vec<ViewId>>();
     let coarse = ids((offered.len() / COARSE_VIEWS).max(1));
-    let scale = (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2);
-    let rays = RayGains::new(field, views, &coarse, RayDensity::COARSE);
+    let worth = Worth::new(settings.counted, field, views, coarse);
     let mut best: Option<usize> = None;
     for (pushes, places) in pushes.chunks(BATCH).zip(feasible.chunks(BATCH)) {
         let predictions = update.predict_pushes(belief, pushes);
-        let gains = rays.under_each(&predictions);
-        for ((prediction, gains), &at) in predictions.iter().zip(&gains).zip(places) {
-            let (view, gain) = best_view(&coarse, gains);
-            candidates[at].gain = Some(gain * scale);
+        for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(places) {
+            candidates[at].gain = Some(gain);
             candidates[at].view = view;
             candidates[at].reg = Some(disturbance(belief, prediction));
             if best.is_none_or(|best| candidates[at].gain > candidates[best].gain) {
@@ -67,12 +67,43 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         for prediction in update.predict_pushes(belief, winner) {
             let (field, all) = (field.with_prediction(&prediction), ids(1));
             let (view, gain) = best_view(&all, &gain_of_views(&field, views, &all, RayDensity::FULL));
-            candidates[at].gain = Some(gain);
+            if settings.counted == Counted::All {
+                candidates[at].gain = Some(gain);
+            }
             candidates[at].view = view;
         }
     }
     let motion = best.and_then(|at| motions[at].take());
     Weighed { candidates, best, motion }
+}
+
+/// What makes a push worth it, and what is computed once for all candidates.
+enum Worth {
+    /// The best of some single views afterwards.
+    View(RayGains, Vec<ViewId>),
+    /// What it opens to some views together.
+    Opened(Openings),
+}
+
+impl Worth {
+    fn new(counted: Counted, field: &GainField, array: &ViewArray, coarse: Vec<ViewId>) -> Self {
+        match counted {
+            Counted::All => Self::View(RayGains::new(field, array, &coarse, RayDensity::COARSE), coarse),
+            Counted::Unseen => Self::Opened(Openings::new(field, array, &coarse, RayDensity::COARSE)),
+        }
+    }
+
+    /// The view that counts, if it is one, and the worth in nats, of every predicted push.
+    fn of_each(&self, predictions: &[PushPrediction]) -> Vec<(Option<ViewId>, f32)> {
+        let of = |prediction: &PushPrediction| match self {
+            Self::View(rays, coarse) => {
+                let (view, gain) = best_view(coarse, &rays.under(prediction));
+                (view, gain * (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2))
+            }
+            Self::Opened(openings) => (None, openings.under(prediction)),
+        };
+        predictions.par_iter().map(of).collect()
+    }
 }
 
 /// Draws one feasible push at random, with those that were rejected on the way.

@@ -90,7 +90,10 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
     let (gamma, patience) = (planner.gamma, planner.patience);
     let (look, push) = (decision.igv, decision.igm + gamma * decision.reg);
     let weighed = decision.best_push.is_some() && decision.igm != 0.0;
-    let scale = look.max(decision.igm).max(1e-6);
+    // What is compared: looking counts patience times where a push has to promise more.
+    let promised = patience * look;
+    let times = if patience == 1.0 { String::new() } else { format!("{patience}·") };
+    let scale = promised.max(decision.igm).max(1e-6);
     let looks = matches!(decision.action, Action::Look { .. });
     let bar = |ui: &mut Ui, name: &str, value: f32, shade: f32, strong: bool, hint: &str| {
         let bar = spark::Bar {
@@ -100,17 +103,29 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
             colour: super::legend::ink(Colormap::Cividis.rgb(shade)),
             strong,
         };
-        spark::bar(ui, &bar, 74.0, 72.0).on_hover_text(hint);
+        spark::bar(ui, &bar, 84.0, 72.0).on_hover_text(hint);
     };
     let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsMore);
-    bar(ui, "Look: IGV", look, 0.85, ruled && looks, "IGV: information gain of the best two views together, nats");
+    let hint = if patience == 1.0 {
+        format!("IGV: {}, nats", planner.counted.of_looks())
+    } else {
+        let nats = words::nats(look);
+        format!("IGV: {}, {nats}; a push has to promise {patience} times that", planner.counted.of_looks())
+    };
+    bar(ui, &format!("Look: {times}IGV"), promised, 0.85, ruled && looks, &hint);
     if weighed {
-        bar(ui, "Push: IGM", decision.igm, 0.5, ruled && !looks, "IGM: best single view after the best push, nats");
+        bar(
+            ui,
+            "Push: IGM",
+            decision.igm,
+            0.5,
+            ruled && !looks,
+            &format!("IGM: {}, nats", planner.counted.of_pushes()),
+        );
         let reg = gamma * decision.reg;
         let hint = "What the push would blur, at most 0: Reg = min(0, H(labels) − H(labels, predicted))";
         bar(ui, "γ·Reg", reg, 0.1, false, hint);
-        let times = if patience == 1.0 { String::new() } else { format!("{patience}·") };
-        let gap = patience * look - push;
+        let gap = promised - push;
         let text = format!("{times}IGV − (IGM + γ·Reg) = {}", words::nats(gap));
         ui.label(RichText::new(text).small()).on_hover_text("The rule looks if this is above 0, and else pushes");
     } else {
@@ -119,16 +134,20 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
     ui.add_space(2.0);
     let what = words::capital(&words::action(&decision.action));
     ui.label(RichText::new(what).strong().heading().size(15.0));
-    ui.label(format!("because {}", because(decision.reason)));
+    ui.label(format!("because {}", because(decision.reason, planner)));
 }
 
 /// A reason as the end of a sentence.
-fn because(reason: Reason) -> String {
+fn because(reason: Reason, planner: &PlannerSettings) -> String {
+    let steps = |which: &str, count: usize| match count {
+        1 => format!("nothing is pushed in the {which} step"),
+        count => format!("nothing is pushed in the {which} {count} steps"),
+    };
     match reason {
         Reason::LookTellsMore | Reason::PushTellsMore | Reason::MapComplete => words::reason(reason).to_owned(),
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
-        Reason::TooEarly => "nothing is pushed in the first steps".to_owned(),
-        Reason::LastStep => "nothing is pushed in the last step".to_owned(),
+        Reason::TooEarly => steps("first", planner.quiet_steps),
+        Reason::LastStep => steps("last", planner.closing_steps),
         Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
         Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),
         Reason::NoCandidate => "no push is feasible".to_owned(),

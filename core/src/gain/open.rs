@@ -1,0 +1,243 @@
+//! What pushes open: what can be seen after a push, from anywhere, that could not be seen before.
+//!
+//! A push is not worth it for the one look that follows: what was in view before can be looked at without it. It is worth
+//! it for the space that it opens to all views together, each voxel counted once:
+//! `sum_k H(p'_k) max(0, V'_k - max(V_k, S_k))` over voxels `k`, where `p'` is the predicted belief, `V_k` and `V'_k` tell
+//! whether any ray of any view reaches the voxel before and after the push, and `S_k` whether a look has seen it.
+//!
+//! A ray is taken to pass where the likeliest map is free (`p < 0.5`). Under the expected transmittance of
+//! [`super::gain_of_views`] a chamber that nobody has looked into closes itself after a few voxels of `p = 0.3`, so that
+//! opening it promises the same whether it is deep or shallow.
+
+use super::RayDensity;
+use super::code::{LIKELIEST, Matter};
+use super::field::{GainField, VoxelBox};
+use super::ray::{Camera, Tally};
+use super::rescore::Reached;
+use crate::belief::PushPrediction;
+use crate::camera::{ViewArray, ViewId};
+use rayon::prelude::*;
+
+/// What all views together reach under one field, so that under a prediction only those rays are walked again that can
+/// meet a changed voxel.
+pub struct Openings {
+    field: GainField,
+    density: RayDensity,
+    /// Per view what each of its rays crosses, by ray number.
+    views: Vec<(Camera, Vec<Reached>)>,
+    /// Per voxel of the padded grid whether a ray reaches it or a look has seen it: 1 or 0, or a share between.
+    open: Vec<f32>,
+}
+
+impl Openings {
+    /// Walks all rays of the given views.
+    pub fn new(field: &GainField, array: &ViewArray, ids: &[ViewId], density: RayDensity) -> Self {
+        let seen = || field.seen.as_ref().map_or_else(|| vec![0.0; field.codes.len()], |seen| seen.to_vec());
+        let walked = ids.par_iter().fold(
+            || (Vec::new(), seen()),
+            |(mut views, mut open), &id| {
+                let camera = Camera::of(field, array, id);
+                let [across, down] = camera.rays(density);
+                let mut reached = vec![Reached::NOTHING; across * down];
+                camera.for_each_ray(field, density, |number, ray| {
+                    let mut tally = Open { open: &mut open, last: 0 };
+                    ray.walk(field, &mut tally);
+                    let last = tally.last;
+                    if let Some(entering) = camera.ray(field, density, [number / down, number % down]) {
+                        reached[number] = Reached::between(field, &entering, last);
+                    }
+                });
+                views.push((camera, reached));
+                (views, open)
+            },
+        );
+        let (views, open) = walked.reduce(
+            || (Vec::new(), Vec::new()),
+            |(mut views, open), (others, other)| {
+                views.extend(others);
+                let larger = |(a, b): (f32, &f32)| a.max(*b);
+                let open = if open.is_empty() { other } else { open.into_iter().zip(&other).map(larger).collect() };
+                (views, open)
+            },
+        );
+        Self { field: field.clone(), density, views, open }
+    }
+
+    /// What a push opens, nats.
+    pub fn under(&self, prediction: &PushPrediction) -> f32 {
+        let (field, changed) = self.field.patched(prediction);
+        let Some(VoxelBox { min, max }) = changed else { return 0.0 };
+        let changed = Reached { min: min.map(|at| at as u16), max: max.map(|at| at as u16) };
+        let mut tally = Opened { open: &self.open, opened: vec![0.0; self.open.len()], nats: 0.0 };
+        for (camera, reached) in &self.views {
+            camera.for_rays(
+                &field,
+                self.density,
+                |number| reached[number].touches(&changed),
+                |_, ray| {
+                    ray.walk(&field, &mut tally);
+                },
+            );
+        }
+        tally.nats as f32
+    }
+}
+
+/// What looks from some views would tell together, nats, by the same count: each voxel once, where the likeliest map lets
+/// a ray reach it, and only what no look has seen.
+pub fn gain_together(field: &GainField, array: &ViewArray, ids: &[ViewId], density: RayDensity) -> f32 {
+    let nothing;
+    let open = match &field.seen {
+        Some(seen) => &seen[..],
+        None => {
+            nothing = vec![0.0; field.codes.len()];
+            &nothing[..]
+        }
+    };
+    let mut tally = Opened { open, opened: vec![0.0; open.len()], nats: 0.0 };
+    for &id in ids {
+        Camera::of(field, array, id).for_each_ray(field, density, |_, ray| ray.walk(field, &mut tally));
+    }
+    tally.nats as f32
+}
+
+/// Voxels that rays reach, and where the last ray ended.
+struct Open<'a> {
+    open: &'a mut [f32],
+    last: usize,
+}
+
+impl Tally for Open<'_> {
+    fn matter(&self) -> &'static [Matter; 256] {
+        &LIKELIEST
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, index: usize, _information: f32, transmittance: f32) {
+        self.open[index] = self.open[index].max(transmittance);
+        self.last = index;
+    }
+}
+
+/// Information of the voxels that rays reach and that were not open.
+struct Opened<'a> {
+    open: &'a [f32],
+    opened: Vec<f32>,
+    nats: f64,
+}
+
+impl Tally for Opened<'_> {
+    fn matter(&self) -> &'static [Matter; 256] {
+        &LIKELIEST
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, index: usize, information: f32, transmittance: f32) {
+        let more = (transmittance - self.open[index].max(self.opened[index])).max(0.0);
+        if more > 0.0 {
+            self.opened[index] = transmittance;
+            self.nats += f64::from(more * information);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::code::MATTER;
+    use super::super::tests::support::{exactly, facing, patchy, small_grid, standard};
+    use super::*;
+    use crate::belief::{Belief, bernoulli_entropy};
+    use crate::grid::{Grid, VoxelSet, Window};
+    use crate::scene::CLASS_COUNT;
+
+    const EVERY: RayDensity = RayDensity { stride_px: 1 };
+
+    /// A row of voxels of 0.1 m into the shelf, a camera that looks straight into it, and the prediction of other
+    /// probabilities for it.
+    fn row(before: &[f32], after: &[f32]) -> (Belief, ViewArray, PushPrediction) {
+        let grid = Grid::for_shelf([0.1, 0.1 * before.len() as f32, 0.1], 0.1);
+        let prediction = PushPrediction {
+            window: Window::whole(&grid),
+            occupancy: after.iter().map(|p| [*p, 1.0 - p]).collect(),
+            semantics: vec![[1.0; CLASS_COUNT]; after.len()],
+            change: vec![1.0; after.len()],
+        };
+        (exactly(grid, |voxel| before[usize::from(voxel.y)]), facing([0.0, -0.3, 0.05]), prediction)
+    }
+
+    fn opened(before: &[f32], after: &[f32], seen: &[usize]) -> f32 {
+        let (belief, array, prediction) = row(before, after);
+        let mut set = VoxelSet::empty(&belief.grid);
+        seen.iter().for_each(|&voxel| set.insert(voxel));
+        let field = GainField::new(&belief).with_seen(&set);
+        Openings::new(&field, &array, &[ViewId(0)], EVERY).under(&prediction)
+    }
+
+    #[test]
+    fn a_push_opens_what_was_behind_and_what_is_deep_counts_in_full() {
+        let (h3, h5) = (bernoulli_entropy(0.3), bernoulli_entropy(0.5));
+        let near = |value: f32, expected: f32| assert!((value - expected).abs() < 0.01, "{value} is not {expected}");
+        // The first voxel leaves: a chamber as deep as may be, up to what is as likely occupied as not.
+        near(opened(&[0.97, 0.3, 0.3, 0.3, 0.5, 0.3], &[0.01, 0.3, 0.3, 0.3, 0.5, 0.3], &[]), 3.0 * h3 + h5);
+        // What could be reached before is not opened, seen or not.
+        near(opened(&[0.3, 0.97, 0.3], &[0.3, 0.01, 0.3], &[]), h3);
+        // What a look has seen is not opened again.
+        near(opened(&[0.97, 0.3, 0.3], &[0.01, 0.3, 0.3], &[1]), h3);
+        // A thing that comes in the way opens nothing, nor does one that blurs.
+        assert_eq!(opened(&[0.01, 0.3, 0.3], &[0.97, 0.3, 0.3], &[]), 0.0);
+        assert_eq!(opened(&[0.01, 0.3, 0.3], &[0.4, 0.3, 0.3], &[0]), 0.0);
+        assert_eq!(opened(&[0.01, 0.3, 0.3], &[0.01, 0.3, 0.3], &[]), 0.0);
+    }
+
+    #[test]
+    fn looks_together_count_each_voxel_once() {
+        let (belief, array, _) = row(&[0.3, 0.3, 0.97, 0.3], &[0.3; 4]);
+        let field = GainField::new(&belief);
+        let gain = gain_together(&field, &array, &[ViewId(0); 2], EVERY);
+        assert!((gain - 2.0 * bernoulli_entropy(0.3)).abs() < 0.01, "{gain}");
+        let mut seen = VoxelSet::empty(&belief.grid);
+        seen.insert(0);
+        let gain = gain_together(&field.with_seen(&seen), &array, &[ViewId(0)], EVERY);
+        assert!((gain - bernoulli_entropy(0.3)).abs() < 0.01, "{gain}");
+        assert_eq!(gain_together(&field, &array, &[], EVERY), 0.0);
+    }
+
+    #[test]
+    fn walking_only_rays_that_meet_a_change_leaves_nothing_out() {
+        let (grid, array) = (small_grid(), standard());
+        let ids: Vec<ViewId> = (0..300).step_by(29).map(ViewId).collect();
+        let density = RayDensity { stride_px: 24 };
+        let reach = |field: &GainField| {
+            let mut open = vec![0.0; field.codes.len()];
+            for &id in &ids {
+                Camera::of(field, &array, id).for_each_ray(field, density, |_, ray| {
+                    ray.walk(field, &mut Open { open: &mut open, last: 0 });
+                });
+            }
+            open
+        };
+        let mut total = 0.0;
+        for seed in 0..12 {
+            let (belief, other) = (patchy(grid, seed), patchy(grid, 100 + seed));
+            let window = Window { x: [6, 24], y: [2, 15] };
+            let prediction = PushPrediction {
+                window,
+                occupancy: window.cells(&grid).flat_map(|cell| other.occupancy[grid.column(cell)].to_vec()).collect(),
+                semantics: vec![[1.0; CLASS_COUNT]; window.cell_count()],
+                change: vec![1.0; window.cell_count()],
+            };
+            let field = GainField::new(&belief);
+            let after = field.with_prediction(&prediction);
+            let expected: f64 = reach(&after)
+                .iter()
+                .zip(reach(&field))
+                .zip(&after.codes)
+                .map(|((now, was), code)| f64::from((now - was).max(0.0) * MATTER[usize::from(*code)].information))
+                .sum();
+            let opened = Openings::new(&field, &array, &ids, density).under(&prediction);
+            assert!((f64::from(opened) - expected).abs() < 1e-4 * (1.0 + expected), "{opened} is not {expected}");
+            total += expected;
+        }
+        assert!(total > 100.0, "the test opens something: {total}");
+    }
+}

@@ -6,7 +6,7 @@
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 use nudge_core::belief::{Belief, PushPrediction, bernoulli_entropy};
 use nudge_core::camera::{Intrinsics, View, ViewArray, ViewId};
-use nudge_core::gain::{GainField, RayDensity, RayGains, best_pair, gain_of_views};
+use nudge_core::gain::{GainField, Openings, RayDensity, RayGains, best_pair, gain_of_views};
 use nudge_core::grid::{Grid, Window};
 use nudge_core::rng::stream;
 use nudge_core::{Point, Pose, Vector};
@@ -57,8 +57,8 @@ fn report(name: &str, belief: &Belief, array: &ViewArray) {
     let pushes: Vec<PushPrediction> = (0..80).map(|index| prediction(belief, index)).collect();
     let base = best_of(3, || drop(black_box(RayGains::new(&field, array, &coarse, RayDensity::COARSE))));
     let rays = RayGains::new(&field, array, &coarse, RayDensity::COARSE);
-    let mut under = Vec::new();
-    let rescored = best_of(3, || under = rays.under_each(&pushes));
+    let mut under: Vec<Vec<f32>> = Vec::new();
+    let rescored = best_of(3, || under = pushes.par_iter().map(|push| rays.under(push)).collect());
     let mut whole = Vec::new();
     let computed = best_of(1, || {
         let gains = |push| gain_of_views(&field.with_prediction(push), array, &coarse, RayDensity::COARSE);
@@ -68,6 +68,13 @@ fn report(name: &str, belief: &Belief, array: &ViewArray) {
     print_row("60 coarse views, every ray kept", base, None, "");
     let note = format!("{:.1} times as fast as walking all rays", computed / rescored);
     print_row("80 predicted pushes x 60 coarse views", rescored, Some(0.25), &note);
+    let base = best_of(3, || drop(black_box(Openings::new(&field, array, &coarse, RayDensity::COARSE))));
+    let openings = Openings::new(&field, array, &coarse, RayDensity::COARSE);
+    let opened = best_of(3, || {
+        black_box(pushes.par_iter().map(|push| openings.under(push)).sum::<f32>());
+    });
+    print_row("what 60 coarse views reach together", base, None, "");
+    print_row("80 predicted pushes: what they open", opened, None, "");
 }
 
 fn print_row(what: &str, seconds: f64, target: Option<f64>, note: &str) {

@@ -62,11 +62,6 @@ impl RayGains {
         let changed = Reached { min: min.map(|at| at as u16), max: max.map(|at| at as u16) };
         self.views.iter().map(|view| nats(view.sum_under(&field, &changed, self.density))).collect()
     }
-
-    /// [`RayGains::under`] every prediction, in parallel and in their order.
-    pub fn under_each(&self, predictions: &[PushPrediction]) -> Vec<Vec<f32>> {
-        predictions.par_iter().map(|prediction| self.under(prediction)).collect()
-    }
 }
 
 impl ViewRays {

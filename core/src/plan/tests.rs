@@ -3,7 +3,7 @@
 use super::*;
 use crate::belief::{Classical, PushPrediction, SweptPush, evidence};
 use crate::camera::{Intrinsics, MapObservation, View};
-use crate::gain::{GainField, RayDensity, gain_of_views};
+use crate::gain::{GainField, Openings, RayDensity, gain_of_views, gain_together};
 use crate::grid::{Grid, VoxelSet, Window};
 use crate::scene::{CLASS_COUNT, Shelf};
 use crate::{Point, Pose, Vector};
@@ -259,6 +259,60 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
     table.history.record(&next, false);
     assert_eq!(table.history.view_of_push, None);
     assert_ne!(table.decide(PolicyKind::Mem).reason, Reason::ViewOfPush);
+}
+
+#[test]
+fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
+    // The boxes leave; what stood behind them is as unknown as before.
+    struct Clears;
+    impl BeliefUpdate for Clears {
+        fn name(&self) -> &str {
+            "clears"
+        }
+
+        fn observe(&self, belief: &Belief, _: &MapObservation) -> Belief {
+            belief.clone()
+        }
+
+        fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+            let cleared = |a: &[f32; 2]| if a[0] > a[1] { [1.0, 100.0] } else { *a };
+            let prediction = PushPrediction {
+                window: Window::whole(&belief.grid),
+                occupancy: belief.occupancy.iter().map(cleared).collect(),
+                semantics: belief.semantics.clone(),
+                change: vec![1.0; belief.grid.cell_count()],
+            };
+            vec![prediction; pushes.len()]
+        }
+    }
+    let mut table = Table::after_looks(6);
+    table.update = Box::new(Clears);
+    table.settings = table.settings.counting(Counted::Unseen);
+    let field = GainField::new(&table.belief);
+    let ids: Vec<ViewId> = (0..12).map(ViewId).collect();
+    let decision = table.decide(PolicyKind::Mem);
+    let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
+    assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
+    let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
+    let opened = Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under(&prediction);
+    assert!(opened > 1.0 && decision.igm == opened, "{opened} {}", decision.igm);
+    let best = &decision.candidates[decision.best_push.expect("a push")];
+    assert!(best.gain == Some(opened) && best.view.is_some());
+
+    // It pushes once looking has less to tell than the push, by far.
+    assert_eq!(decision.reason, Reason::LookTellsMore);
+    table.settings.patience = 0.9 * decision.igm / decision.igv;
+    let decision = table.decide(PolicyKind::Mem);
+    assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Push(best.push)));
+
+    // What a push only blurs is worth nothing.
+    table.seen =
+        Some((0..table.belief.grid.voxel_count()).fold(VoxelSet::empty(&table.belief.grid), |mut all, voxel| {
+            all.insert(voxel);
+            all
+        }));
+    table.update = Box::new(Prophet::Forgets);
+    assert_eq!(table.decide(PolicyKind::Mem).igm, 0.0);
 }
 
 #[test]

@@ -103,7 +103,7 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
             colour: super::legend::ink(Colormap::Cividis.rgb(shade)),
             strong,
         };
-        spark::bar(ui, &bar, 84.0, 72.0).on_hover_text(hint);
+        spark::bar(ui, &bar, if patience == 1.0 { 74.0 } else { 88.0 }, 72.0).on_hover_text(hint);
     };
     let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsMore);
     let hint = if patience == 1.0 {

@@ -28,8 +28,8 @@ const SUBS: usize = 4;
 /// Memory for beliefs that are kept, bytes.
 const BELIEFS_BYTES: usize = 6 << 30;
 /// How much a floor cell that does not change counts beside one that does. Next to nothing: the posterior is gated with the
-/// probability of change, so what is wanted is the prediction given that the cell changes. (With 0.1 three quarters of the
-/// loss were of unchanged cells, the prediction was hedged towards them, and the gate hedged it once more.)
+/// probability of change, so what is wanted is the prediction given that the cell changes. (With 0.1 about half of
+/// the loss was of unchanged cells: the prediction was hedged towards them, and the gate hedged it once more.)
 const UNCHANGED: f64 = 1e-3;
 /// Weight of the consistency term.
 const CONSISTENCY: f64 = 0.01;

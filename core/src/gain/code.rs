@@ -41,8 +41,8 @@ pub(super) static MATTER: LazyLock<[Matter; 256]> = LazyLock::new(|| {
     })
 });
 
-/// [`Matter`] by code where the likeliest map stands for the belief: what is more likely occupied than not stops a ray, the
-/// rest lets it pass.
+/// [`Matter`] by code where the likeliest map stands for the belief: what is at least as likely occupied as not stops
+/// a ray, the rest lets it pass.
 pub(super) static LIKELIEST: LazyLock<[Matter; 256]> =
     LazyLock::new(|| MATTER.map(|matter| Matter { pass: if matter.pass > 0.5 { 1.0 } else { 0.0 }, ..matter }));
 

@@ -1,4 +1,4 @@
-# make demo · make workbench · make cnabu · make test · make regress · make bench · make lint — each sets up what it needs, once.
+# make demo · make workbench · make workbench-cnabu · make cnabu · make test · make regress · make bench · make lint — each sets up what it needs, once.
 # Everything is built with one profile (release), in CARGO_TARGET_DIR if that is set, else in target/.
 export CARGO_TARGET_DIR ?= $(CURDIR)/target
 NUDGE := $(CARGO_TARGET_DIR)/release/nudge
@@ -7,14 +7,15 @@ VENV  := $(CARGO_TARGET_DIR)/venv
 WINDOW := --features nudge-tests/workbench
 
 # With neural belief updates: needs libtorch, which scripts/libtorch.sh fetches unless LIBTORCH names one. The tests' own
-# crate stays out: a feature of `nudge` asked for by the whole workspace would bring the window along.
+# crate stays out: with it the window would come along.
 NETWORKS := -p nudge-core -p nudge --features nudge/cnabu
 DATA := $(CURDIR)/out/data
 
-.PHONY: help setup graphics python demo workbench cnabu train train-push test test-cnabu test-headless regress bench bench-window lint lint-cnabu
+.PHONY: help setup graphics python demo workbench workbench-cnabu cnabu train train-push test test-cnabu test-headless regress bench bench-window lint lint-cnabu
 help:
 	@echo 'make demo        map a crowded shelf: prints the table, writes out/demo/'
 	@echo 'make workbench   build and open the window (the first build takes about 45 minutes on two cores)'
+	@echo 'make workbench-cnabu  the same with neural belief updates'
 	@echo 'make cnabu       build with neural belief updates (fetches libtorch, 540 MB, once)'
 	@echo 'make train       make data and train sigma_o; goes on where it was stopped (make train-push: sigma_m)'
 	@echo 'make test-cnabu  tests of the neural belief updates'
@@ -40,6 +41,10 @@ demo: setup
 
 workbench: graphics
 	cargo build --release --locked --workspace $(WINDOW)
+	$(NUDGE)
+
+workbench-cnabu: graphics
+	LIBTORCH="$$(scripts/libtorch.sh)" cargo build --release --locked --workspace $(WINDOW),nudge/cnabu
 	$(NUDGE)
 
 cnabu: setup

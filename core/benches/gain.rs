@@ -71,7 +71,7 @@ fn report(name: &str, belief: &Belief, array: &ViewArray) {
     let base = best_of(3, || drop(black_box(Openings::new(&field, array, &coarse, RayDensity::COARSE))));
     let openings = Openings::new(&field, array, &coarse, RayDensity::COARSE);
     let opened = best_of(3, || {
-        black_box(pushes.par_iter().map(|push| openings.under(push)).sum::<f32>());
+        black_box(openings.under_each(&pushes));
     });
     print_row("what 60 coarse views reach together", base, None, "");
     print_row("80 predicted pushes: what they open", opened, None, "");

@@ -29,13 +29,15 @@ pub use layout::{LEVELS, Layout, Mirror};
 #[cfg(feature = "cnabu")]
 pub use loss::{LossForm, expected_log_loss, kl_to_uniform, marginal_log_loss, occupancy_loss, semantics_loss};
 #[cfg(feature = "cnabu")]
-pub use observe_net::{Evidence, ObserveConfig, ObserveNet};
+pub use net::Network;
 #[cfg(feature = "cnabu")]
-pub(crate) use predict::{Numbers, Windowed, push_planes, windows};
+pub use observe_net::{Evidence, ObserveNet};
 #[cfg(feature = "cnabu")]
-pub(crate) use push_net::WINDOW;
+pub(crate) use predict::{Numbers, Windowed, push_planes};
 #[cfg(feature = "cnabu")]
-pub use push_net::{PushConfig, PushNet, PushPlanes, Pushed};
+pub use push_net::{PriorParts, PushNet, PushPlanes, Pushed};
+#[cfg(feature = "cnabu")]
+pub(crate) use push_net::{WINDOW, windows};
 pub use scored::Scored;
 #[cfg(feature = "cnabu")]
 pub use tch::{Device, Tensor};
@@ -44,7 +46,7 @@ pub use update::Cnabu;
 #[cfg(feature = "cnabu")]
 pub(crate) use update::{belief_of, observation_planes};
 #[cfg(feature = "cnabu")]
-pub use weights::{Card, card_path, read_tensors, write_tensors};
+pub use weights::{Card, UPDATES, card_path, load_network, read_tensors, write_tensors};
 
 use crate::Result;
 use crate::belief::BeliefUpdate;

@@ -21,13 +21,16 @@ mod train;
 
 pub use card::{Card, Kind, NAME as CARD_NAME};
 pub use dataset::Dataset;
-pub use evaluate::{PushTallies, evaluate, evaluate_pushes};
+pub use evaluate::{PushTallies, evaluate, evaluate_after_pushes, evaluate_pushes};
 pub use make::{Job, Progress, make};
 pub use maps::{MapSample, Recipe, ViewSample};
-pub use pushes::{PUSHES, PushSample, PushedSample};
+pub use pushes::{PUSHES, PushSample, PushedSample, VIEWS_AFTER};
 pub use shard::SAMPLES_PER_SHARD;
 #[cfg(feature = "cnabu")]
-pub use train::{PushLoss, PushTrainer, TrainSettings, Trainer, ViewLoss, checkpoint_path, settings_path};
+pub use train::{
+    AfterPushes, ObserveTrainer, Priors, PushLoss, PushTrainer, TrainSettings, Trainer, ViewLoss, checkpoint_path,
+    settings_path,
+};
 
 /// Views that a sample holds.
 pub const VIEWS: usize = 10;

@@ -7,7 +7,7 @@ use nudge_core::Error;
 use nudge_core::belief::{BeliefUpdate, CLASSICAL, CNABU, Classical};
 use nudge_core::cnabu::{self, Scored};
 use nudge_core::files::write_atomically;
-use nudge_core::learn::{Dataset, MapSample, PushSample, evaluate, evaluate_pushes};
+use nudge_core::learn::{Dataset, MapSample, PushSample, evaluate, evaluate_after_pushes, evaluate_pushes};
 use nudge_core::score::{Scores, Tally};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -38,12 +38,12 @@ pub struct Args {
     json: bool,
 }
 
-/// Scores after each number of views.
-pub(super) fn scored(tallies: &[Tally]) -> Vec<Scored> {
+/// Scores after each number of views, from `first` on.
+pub(super) fn scored(first: usize, tallies: &[Tally]) -> Vec<Scored> {
     let row = |(at, tally): (usize, &Tally)| {
         let scores = tally.scores();
         Scored {
-            views: at + 1,
+            views: first + at,
             occupancy_iou: scores.occupancy_iou,
             occupied_iou: scores.occupied_iou,
             semantic_miou: scores.semantic_miou,
@@ -81,6 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut results: Vec<(String, Vec<Tally>)> = Vec::new();
     let mut predictions: Vec<(String, Scores)> = Vec::new();
+    let mut afterwards: Vec<(String, Vec<Tally>)> = Vec::new();
     for name in &args.beliefs {
         let update: Arc<dyn BeliefUpdate> = match name.as_str() {
             CLASSICAL => Arc::new(Classical),
@@ -99,13 +100,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             let tallies = evaluate_pushes(pushes, &*update, &*update, &mut |_| ())?;
             predictions.push((name.clone(), tallies.predicted.scores()));
             predictions.push((format!("{name}, as if nothing had changed"), tallies.unchanged.scores()));
+            afterwards.push((name.clone(), evaluate_after_pushes(pushes, &*update, &mut |_| ())?));
         }
     }
     let page = args.out.as_deref().map(|out| write_page(out, &args.data, data.len(), &results)).transpose()?;
     if args.json {
         let rows: Vec<_> = results
             .iter()
-            .map(|(name, tallies)| serde_json::json!({ "belief": name, "scores": scored(tallies), "tallies": tallies }))
+            .map(|(name, tallies)| serde_json::json!({ "belief": name, "scores": scored(1, tallies), "tallies": tallies }))
             .collect();
         return super::print(&super::to_json(
             &serde_json::json!({ "data": args.data, "scenes": data.len(), "results": rows }),
@@ -113,7 +115,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     super::print(&format!("{}: {} scenes\n", args.data.display(), data.len()))?;
     for (name, tallies) in &results {
-        super::print(&table(name, &scored(tallies)))?;
+        super::print(&table(name, &scored(1, tallies)))?;
     }
     if !predictions.is_empty() {
         super::print("\nafter pushes, on the floor cells that change:  occupied IoU  semantic mIoU  mECE occ.\n")?;
@@ -121,6 +123,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             let line =
                 format!("{name:<45} {:>13.3} {:>14.3} {:>10.3}\n", s.occupied_iou, s.semantic_miou, s.mece_occupancy);
             super::print(&line)?;
+        }
+        super::print("\nwhole map after a push and some views:\n")?;
+        for (name, tallies) in &afterwards {
+            super::print(&table(name, &scored(0, tallies)))?;
         }
     }
     page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
@@ -145,7 +151,7 @@ fn write_page(out: &Path, data: &Path, scenes: usize, results: &[(String, Vec<Ta
              <th>mECE occupancy</th><th>mECE semantics</th></tr>\n",
             escape(name)
         );
-        for s in scored(tallies) {
+        for s in scored(1, tallies) {
             let numbers = [s.occupancy_iou, s.occupied_iou, s.semantic_miou, s.mece_occupancy, s.mece_semantics];
             let cells: String = numbers.iter().map(|n| format!("<td>{n:.3}</td>")).collect();
             html += &format!("<tr><td>{}</td>{cells}</tr>\n", s.views);

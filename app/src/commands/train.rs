@@ -46,7 +46,7 @@ pub(super) struct SessionArgs {
     /// Go on with the run from its checkpoint
     #[arg(long)]
     resume: bool,
-    /// Begin with the checkpoint of another run
+    /// Begin with the checkpoint of another run, or with finished weights (FILE.safetensors)
     #[arg(long, value_name = "FILE", conflicts_with = "resume")]
     from: Option<PathBuf>,
     /// Replace the run that is there
@@ -108,6 +108,12 @@ pub(super) struct ObserveArgs {
     /// Most views in a sequence
     #[arg(long, default_value_t = 20)]
     max_views: usize,
+    /// Data of `nudge data pushes`: some sequences begin after a push, as the shipped networks predict it
+    #[arg(long, value_name = "DIR")]
+    pushes: Option<PathBuf>,
+    /// Share of the sequences that do
+    #[arg(long, default_value_t = 0.3, requires = "pushes")]
+    push_share: f64,
 }
 
 /// What was typed after `nudge train push`.

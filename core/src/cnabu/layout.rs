@@ -13,6 +13,7 @@ use crate::camera::{MapObservation, UNOBSERVED};
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::CLASS_COUNT;
 use crate::{Error, Result};
+use rand::Rng;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -42,6 +43,13 @@ pub enum Mirror {
     No,
     /// Left is right.
     X,
+}
+
+impl Mirror {
+    /// The one or the other, each as likely.
+    pub(crate) fn either(rng: &mut impl Rng) -> Self {
+        if rng.random() { Self::X } else { Self::No }
+    }
 }
 
 /// The planes of a grid.
@@ -129,7 +137,7 @@ impl Layout {
         })
     }
 
-    /// The share of occupied voxels per level in the pixels `x`: [`OCCUPANCY`] planes of 0, a half or 1.
+    /// The share of occupied voxels per level in the pixels `x`: [`OCCUPANCY`] planes of 0, a half or 1 (zero before).
     pub(crate) fn put_set(&self, set: &VoxelSet, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
         const SHARE: [f32; 4] = [0.0, 0.5, 0.5, 1.0];
         let plane = x.len() * self.pixels[1];
@@ -143,6 +151,9 @@ impl Layout {
             let (word, shift) = (bit / 64, bit % 64);
             let high = if shift == 0 { 0 } else { words.get(word + 1).copied().unwrap_or(0) << (64 - shift) };
             let mut bits = (words[word] >> shift | high) & mask;
+            if bits == 0 {
+                continue;
+            }
             for level in 0..LEVELS {
                 out[(level * SUBS + sub) * plane + pixel] = SHARE[(bits & 3) as usize];
                 bits >>= VOXELS_PER_LEVEL;

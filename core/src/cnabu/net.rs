@@ -3,6 +3,15 @@
 use tch::Tensor;
 use tch::nn::{self, Module};
 
+/// A network of the belief update.
+pub trait Network: Sized {
+    /// Its name in cards.
+    const NAME: &str;
+
+    /// The network with its variables under `path`; `width` is the channels of the U-Net's first level, a multiple of 8.
+    fn new(path: &nn::Path<'_>, width: i64) -> Self;
+}
+
 /// Groups of the group norms.
 const GROUPS: i64 = 8;
 

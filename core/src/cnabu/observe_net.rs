@@ -6,7 +6,7 @@
 //! the labels, the prior Dirichlet and a slice of the occupancy posterior 3 cm above the board.
 
 use super::layout::{LABELS, LEVELS, OCCUPANCY, SEMANTICS, SUBS};
-use super::net::{UNet, conv};
+use super::net::{Network, UNet, conv};
 use crate::scene::CLASS_COUNT;
 use tch::nn::{self, Module};
 use tch::{Kind, Tensor};
@@ -24,19 +24,6 @@ pub(super) fn limited(z: &Tensor, kinds: usize) -> Tensor {
     let by_kind = z.view([size[0], kinds as i64, -1, size[2], size[3]]);
     let above = (by_kind.amax([1], true) - LOG_EVIDENCE_LIMIT).clamp_min(0.0);
     (by_kind - above).view(&size[..])
-}
-
-/// What the network's size is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ObserveConfig {
-    /// Channels of the U-Net's first level; a multiple of 8.
-    pub width: i64,
-}
-
-impl Default for ObserveConfig {
-    fn default() -> Self {
-        Self { width: 32 }
-    }
 }
 
 /// Logarithms of evidence as planes: a network's state between observations.
@@ -61,9 +48,20 @@ impl Evidence {
         Self { occupancy: log(z_occupancy, 2), semantics: log(z_semantics, CLASS_COUNT) }
     }
 
+    /// The same on a device.
+    pub fn to_device(&self, device: tch::Device) -> Self {
+        Self { occupancy: self.occupancy.to_device(device), semantics: self.semantics.to_device(device) }
+    }
+
     /// The same with numbers of another kind.
     pub fn to_kind(&self, kind: Kind) -> Self {
         Self { occupancy: self.occupancy.to_kind(kind), semantics: self.semantics.to_kind(kind) }
+    }
+
+    /// What it takes of memory, bytes.
+    pub fn bytes(&self) -> usize {
+        let of = |planes: &Tensor| planes.numel() * planes.kind().elt_size_in_bytes();
+        of(&self.occupancy) + of(&self.semantics)
     }
 
     /// The same with left and right exchanged; for planes without padding.
@@ -103,11 +101,12 @@ pub struct ObserveNet {
 /// Channels of the semantic head.
 const SEMANTIC_WIDTH: i64 = 64;
 
-impl ObserveNet {
-    /// The network with its variables under `path`.
-    pub fn new(path: &nn::Path<'_>, config: ObserveConfig) -> Self {
+impl Network for ObserveNet {
+    const NAME: &str = "sigma_o";
+
+    fn new(path: &nn::Path<'_>, width: i64) -> Self {
         let (occupancy, semantics, labels) = (2 * OCCUPANCY as i64, SEMANTICS as i64, LABELS as i64);
-        let stem = 2 * config.width;
+        let stem = 2 * width;
         let per_channel =
             |name: &str, channels: i64, value: f64| path.var(name, &[1, channels, 1, 1], nn::Init::Const(value));
         let small = |name: &str, from: i64, to: i64, bias: f64| {
@@ -123,9 +122,9 @@ impl ObserveNet {
             stem_semantics: conv(path / "stem_semantics", semantics, stem, 1),
             stem_observed: conv(path / "stem_observed", occupancy, stem, 1),
             stem_labels: conv(path / "stem_labels", labels, stem, 1),
-            unet: UNet::new(&(path / "unet"), stem, config.width),
-            occupancy_head: small("occupancy_head", config.width, occupancy, -1.0),
-            semantic_mix: conv(path / "semantic_mix", config.width, SEMANTIC_WIDTH, 1),
+            unet: UNet::new(&(path / "unet"), stem, width),
+            occupancy_head: small("occupancy_head", width, occupancy, -1.0),
+            semantic_mix: conv(path / "semantic_mix", width, SEMANTIC_WIDTH, 1),
             semantic_labels: conv(path / "semantic_labels", labels, SEMANTIC_WIDTH, 1),
             semantic_prior: conv(path / "semantic_prior", semantics, SEMANTIC_WIDTH, 1),
             semantic_slice: conv(path / "semantic_slice", 2 * SUBS as i64, SEMANTIC_WIDTH, 1),
@@ -138,7 +137,9 @@ impl ObserveNet {
             label: per_channel("label", semantics, 2.0),
         }
     }
+}
 
+impl ObserveNet {
     /// `z` of the posterior (`a = 1 + e^z`), of the shapes of [`Evidence`], from the prior, the levels observed (occupied,
     /// then free; `[B, 2 * levels * 4, X, Y]`) and the one-hot labels (`[B, 16 * 4, X, Y]`).
     pub fn forward(&self, prior: &Evidence, observed: &Tensor, labels: &Tensor) -> (Tensor, Tensor) {

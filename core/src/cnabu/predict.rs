@@ -1,8 +1,9 @@
-//! sigma_m's predictions: candidates in batches, windows around the pushes, gated with the probability of change.
+//! sigma_m's predictions: candidates in batches, windows around the pushes, heads only where something is likely to change,
+//! gated with the probability of change.
 
 use super::layout::{LEVELS, Layout, Mirror, OCCUPANCY, SEMANTICS, SUBS, VOXELS_PER_LEVEL};
-use super::observe_net::{Evidence, limited};
-use super::push_net::{MARKS, PushNet, PushPlanes, Pushed, WINDOW};
+use super::observe_net::{Evidence, LOG_EVIDENCE_LIMIT};
+use super::push_net::{Body, MARKS, Pixels, PushNet, PushPlanes, WINDOW};
 use crate::belief::{Belief, Carried, FloorPlan, PushPrediction, SOLID, SweptPush};
 use crate::grid::Window;
 use crate::scene::CLASS_COUNT;
@@ -13,7 +14,7 @@ use tch::{Device, Kind, Tensor};
 /// Candidates that go through the network together.
 const BATCH: usize = 16;
 /// Probability of change below which a floor cell keeps its belief as it is.
-const CHANGE_FLOOR: f32 = 0.02;
+const CHANGE_FLOOR: f32 = 0.05;
 
 /// A push, what it carries along, and the pixels of its window.
 pub(crate) struct Windowed<'a> {
@@ -70,12 +71,6 @@ pub(crate) fn push_planes(layout: &Layout, prior: &Numbers, pushes: &[Windowed<'
     }
 }
 
-/// Windows of planes `[1, C, X, Y]`, one above the other: `[B, C, WINDOW, Y]`.
-pub(crate) fn windows(planes: &Tensor, xs: &[Range<usize>]) -> Tensor {
-    let cut: Vec<Tensor> = xs.iter().map(|x| planes.narrow(2, x.start as i64, x.len() as i64)).collect();
-    Tensor::cat(&cut, 0)
-}
-
 /// The predictions of a network for pushes from one belief, whose evidence is `prior`.
 pub(super) fn predict(
     net: &PushNet,
@@ -85,7 +80,7 @@ pub(super) fn predict(
     pushes: &[SweptPush],
     device: Device,
 ) -> Vec<PushPrediction> {
-    let stem = net.prior_stem(prior);
+    let parts = net.prior_parts(prior);
     let numbers = Numbers::of(prior);
     let plan = FloorPlan::new(belief, SOLID);
     let mut predictions = Vec::with_capacity(pushes.len());
@@ -98,67 +93,134 @@ pub(super) fn predict(
             .collect();
         let xs: Vec<Range<usize>> = windowed.iter().map(|push| push.x.clone()).collect();
         let planes = push_planes(layout, &numbers, &windowed, Mirror::No).to_device(device);
-        let prior = Evidence { occupancy: windows(&prior.occupancy, &xs), semantics: windows(&prior.semantics, &xs) };
-        let pushed = net.forward(&windows(&stem, &xs), &prior, &planes);
-        let planes = Planes::of(&pushed, layout.pixels()[1]);
-        predictions.par_extend(xs.into_par_iter().enumerate().map(|(at, x)| planes.prediction(at, layout, belief, x)));
+        let body = net.body(&parts.windows(&xs), &planes);
+        let z = values(&body.change);
+        let (z, each) = (&z[..], z.len() / xs.len());
+        let changing: Vec<Changing> =
+            z.par_chunks(each).zip(&xs).map(|(z, x)| Changing::new(z, layout, x.clone())).collect();
+        let heads = Heads::of(net, prior, &body, &planes, &changing, layout, device);
+        let mut next = 0;
+        let firsts = changing.iter().map(|changing| {
+            next += changing.pixels.len();
+            next - changing.pixels.len()
+        });
+        let firsts: Vec<usize> = firsts.collect();
+        let each = changing.par_iter().zip(firsts).map(|(changing, first)| heads.prediction(changing, first, belief));
+        predictions.par_extend(each);
     }
     predictions
 }
 
-/// Evidence and probability of change of a batch, on the processor.
-struct Planes {
-    occupancy: Vec<f32>,
-    semantics: Vec<f32>,
-    change: Vec<f32>,
-    plane: usize,
-    across: usize,
+/// Where a push is likely to change something.
+struct Changing<'a> {
+    layout: &'a Layout,
+    /// Pixels of the window along x.
+    x: Range<usize>,
+    /// Probability of change per sub-cell and pixel of the window; 0 below [`CHANGE_FLOOR`].
+    chance: Vec<f32>,
+    /// Pixels of the window in which it is not 0 everywhere, in ascending order.
+    pixels: Vec<usize>,
 }
 
-impl Planes {
-    fn of(pushed: &Pushed, across: usize) -> Self {
-        let evidence = |z: &Tensor, kinds: usize| limited(z, kinds).exp() + 1.0;
-        let change = evidence(&pushed.change, 2);
-        let (yes, no) = (change.narrow(1, 0, SUBS as i64), change.narrow(1, SUBS as i64, SUBS as i64));
-        let size = pushed.change.size();
-        Self {
-            occupancy: values(&evidence(&pushed.occupancy, 2)),
-            semantics: values(&evidence(&pushed.semantics, CLASS_COUNT)),
-            change: values(&(&yes / (&yes + no))),
-            plane: (size[2] * size[3]) as usize,
-            across,
-        }
-    }
-
-    /// The prediction of push `at` of the batch, whose window has the pixels `x`; cut to where something may change.
-    fn prediction(&self, at: usize, layout: &Layout, belief: &Belief, x: Range<usize>) -> PushPrediction {
-        let plane = self.plane;
-        let part = |channels: usize| at * channels * plane..(at + 1) * channels * plane;
-        let occupancy = &self.occupancy[part(2 * OCCUPANCY)];
-        let semantics = &self.semantics[part(SEMANTICS)];
-        let change = &self.change[part(SUBS)];
-        let grid = &belief.grid;
-        let place = |cell: usize| {
-            let (cx, cy) = (cell / grid.dims[1], cell % grid.dims[1]);
-            (cx % 2 * 2 + cy % 2, (cx / 2 - x.start) * self.across + cy / 2)
-        };
-        let chance = |cell: usize| {
-            let (sub, pixel) = place(cell);
-            let p = change[sub * plane + pixel];
+impl<'a> Changing<'a> {
+    /// From the change planes of one window, for and against.
+    fn new(z: &[f32], layout: &'a Layout, x: Range<usize>) -> Self {
+        let plane = z.len() / (2 * SUBS);
+        let (yes, no) = z.split_at(SUBS * plane);
+        let chance = |(&yes, &no): (&f32, &f32)| {
+            let [yes, no] = evidence([yes, no]);
+            let p = yes / (yes + no);
             if p < CHANGE_FLOOR { 0.0 } else { p }
         };
-        let reach =
-            Window { x: [(2 * x.start).min(grid.dims[0]), (2 * x.end).min(grid.dims[0])], y: [0, grid.dims[1]] };
-        let window = tight(reach, layout, &chance);
-        let height = grid.dims[2];
+        let chance: Vec<f32> = yes.iter().zip(no).map(chance).collect();
+        let pixels = (0..plane).filter(|pixel| (0..SUBS).any(|sub| chance[sub * plane + pixel] > 0.0)).collect();
+        Self { layout, x, chance, pixels }
+    }
+
+    /// Sub-cell and pixel of the window of a floor cell in it.
+    fn place(&self, cell: usize) -> (usize, usize) {
+        let (cx, cy) = (cell / self.layout.grid().dims[1], cell % self.layout.grid().dims[1]);
+        (cx % 2 * 2 + cy % 2, (cx / 2 - self.x.start) * self.layout.pixels()[1] + cy / 2)
+    }
+
+    /// Probability that a floor cell of the window changes.
+    fn of_cell(&self, cell: usize) -> f32 {
+        let (sub, pixel) = self.place(cell);
+        self.chance[sub * (self.chance.len() / SUBS) + pixel]
+    }
+
+    /// The smallest window that holds every cell with a chance of change; one cell when there is none.
+    fn tight(&self) -> Window {
+        let grid = self.layout.grid();
+        let [width, depth, _] = grid.dims;
+        let reach = Window { x: [(2 * self.x.start).min(width), (2 * self.x.end).min(width)], y: [0, depth] };
+        let (mut low, mut high) = ([usize::MAX; 2], [0_usize; 2]);
+        for cell in reach.cells(grid).filter(|cell| self.of_cell(*cell) > 0.0) {
+            for (axis, at) in [cell / depth, cell % depth].into_iter().enumerate() {
+                low[axis] = low[axis].min(at);
+                high[axis] = high[axis].max(at + 1);
+            }
+        }
+        if high[0] == 0 {
+            return Window { x: [reach.x[0], reach.x[0] + 1], y: [reach.y[0], reach.y[0] + 1] };
+        }
+        Window { x: [low[0], high[0]], y: [low[1], high[1]] }
+    }
+}
+
+/// What the heads give at the pixels of a batch where something is likely to change, on the processor.
+struct Heads {
+    /// Pixel by pixel `2 * levels * 4` and `classes * 4` numbers.
+    occupancy: Vec<f32>,
+    semantics: Vec<f32>,
+}
+
+impl Heads {
+    fn of(
+        net: &PushNet,
+        prior: &Evidence,
+        body: &Body,
+        planes: &PushPlanes,
+        changing: &[Changing<'_>],
+        layout: &Layout,
+        device: Device,
+    ) -> Self {
+        let numbered = changing.iter().enumerate();
+        let all = numbered.flat_map(|(window, changing)| {
+            let first = changing.x.start * layout.pixels()[1];
+            changing.pixels.iter().map(move |&pixel| [window, pixel, first + pixel].map(|n| n as i64))
+        });
+        let all: Vec<[i64; 3]> = all.collect();
+        if all.is_empty() {
+            return Self { occupancy: Vec::new(), semantics: Vec::new() };
+        }
+        let column = |which: usize| all.iter().map(|numbers| numbers[which]).collect::<Vec<i64>>();
+        let in_windows = Pixels::new(&column(0), &column(1), device);
+        let in_whole = Pixels::new(&vec![0; all.len()], &column(2), device);
+        let (occupancy, semantics) = net.heads(
+            &body.at(&in_windows),
+            &in_whole.of_evidence(prior),
+            &in_windows.of(&planes.swept),
+            &in_windows.of_evidence(&planes.arriving),
+        );
+        let by_pixel = |planes: &Tensor| values(&planes.transpose(1, 2));
+        Self { occupancy: by_pixel(&occupancy), semantics: by_pixel(&semantics) }
+    }
+
+    /// The prediction of a push whose pixels begin at `first`; cut to where something may change.
+    fn prediction(&self, changing: &Changing<'_>, first: usize, belief: &Belief) -> PushPrediction {
+        let grid = &belief.grid;
+        let window = changing.tight();
+        let mut order = vec![0_usize; changing.chance.len() / SUBS];
+        changing.pixels.iter().enumerate().for_each(|(at, &pixel)| order[pixel] = first + at);
         let mut prediction = PushPrediction {
             window,
-            occupancy: Vec::with_capacity(window.cell_count() * height),
+            occupancy: Vec::with_capacity(window.cell_count() * grid.dims[2]),
             semantics: Vec::with_capacity(window.cell_count()),
             change: Vec::with_capacity(window.cell_count()),
         };
         for cell in window.cells(grid) {
-            let p = chance(cell);
+            let p = changing.of_cell(cell);
             prediction.change.push(p);
             let (before, labels) = (&belief.occupancy[grid.column(cell)], &belief.semantics[cell]);
             if p == 0.0 {
@@ -166,17 +228,36 @@ impl Planes {
                 prediction.semantics.push(*labels);
                 continue;
             }
-            let (sub, pixel) = place(cell);
+            let (sub, pixel) = changing.place(cell);
+            let z = channels_of(&self.occupancy, 2 * OCCUPANCY, order[pixel]);
+            let after: [[f32; 2]; LEVELS] =
+                std::array::from_fn(|level| evidence([level, LEVELS + level].map(|plane| z[plane * SUBS + sub])));
+            // The voxels of a level mostly share their evidence, and those above the levels too.
+            let mut last = ([f32::NAN; 2], 0, [0.0; 2]);
             prediction.occupancy.extend(before.iter().enumerate().map(|(z, a)| {
                 let level = (z / VOXELS_PER_LEVEL).min(LEVELS - 1);
-                let after = |side: usize| occupancy[((side * LEVELS + level) * SUBS + sub) * plane + pixel];
-                gated(a, &[after(0), after(1)], p)
+                if (last.0, last.1) != (*a, level) {
+                    last = (*a, level, gated(a, &after[level], p));
+                }
+                last.2
             }));
-            let after: [f32; CLASS_COUNT] = std::array::from_fn(|k| semantics[(k * SUBS + sub) * plane + pixel]);
+            let z = channels_of(&self.semantics, SEMANTICS, order[pixel]);
+            let after: [f32; CLASS_COUNT] = evidence(std::array::from_fn(|class| z[class * SUBS + sub]));
             prediction.semantics.push(gated(labels, &after, p));
         }
         prediction
     }
+}
+
+/// The channels of a pixel.
+fn channels_of(by_pixel: &[f32], channels: usize, pixel: usize) -> &[f32] {
+    &by_pixel[pixel * channels..(pixel + 1) * channels]
+}
+
+/// Evidence `a = 1 + e^z`, limited as a network's state is ([`super::observe_net`]): all kinds are lowered alike.
+fn evidence<const K: usize>(z: [f32; K]) -> [f32; K] {
+    let above = (z.into_iter().fold(f32::MIN, f32::max) - LOG_EVIDENCE_LIMIT as f32).max(0.0);
+    z.map(|z| 1.0 + (z - above).exp())
 }
 
 /// What is believed when with probability `p` a cell changes, and then has evidence `after`, and else keeps its evidence.
@@ -184,31 +265,61 @@ impl Planes {
 /// The means are mixed, `P = (1 - p) P_kept + p P_changed`, and so are the epistemic uncertainties `K / sum(a)`. (Mixing
 /// the evidence itself, `(1 - p) a + p a_changed`, would let what was once well known drown a prediction that is
 /// honestly unsure, however probable the change.)
+#[inline(always)]
 fn gated<const K: usize>(kept: &[f32; K], after: &[f32; K], p: f32) -> [f32; K] {
-    let sums = [kept, after].map(|a| a.iter().sum::<f32>());
-    let sum = 1.0 / ((1.0 - p) / sums[0] + p / sums[1]);
-    std::array::from_fn(|k| sum * ((1.0 - p) * kept[k] / sums[0] + p * after[k] / sums[1]))
-}
-
-/// The smallest window within `reach` that holds every cell with a chance of change; one cell when there is none.
-fn tight(reach: Window, layout: &Layout, chance: &impl Fn(usize) -> f32) -> Window {
-    let depth = layout.grid().dims[1];
-    let (mut low, mut high) = ([usize::MAX; 2], [0_usize; 2]);
-    for cell in reach.cells(layout.grid()).filter(|cell| chance(*cell) > 0.0) {
-        for (axis, at) in [cell / depth, cell % depth].into_iter().enumerate() {
-            low[axis] = low[axis].min(at);
-            high[axis] = high[axis].max(at + 1);
-        }
-    }
-    if high[0] == 0 {
-        return Window { x: [reach.x[0], reach.x[0] + 1], y: [reach.y[0], reach.y[0] + 1] };
-    }
-    Window { x: [low[0], high[0]], y: [low[1], high[1]] }
+    let [kept_weight, after_weight] = [(kept, 1.0 - p), (after, p)].map(|(a, share)| share / a.iter().sum::<f32>());
+    let sum = 1.0 / (kept_weight + after_weight);
+    let [kept_weight, after_weight] = [kept_weight, after_weight].map(|weight| sum * weight);
+    std::array::from_fn(|k| kept_weight * kept[k] + after_weight * after[k])
 }
 
 #[cfg(test)]
 mod tests {
-    use super::gated;
+    use super::*;
+    use crate::cnabu::{Network, Pushed};
+    use tch::Kind;
+
+    #[test]
+    fn heads_at_some_pixels_are_those_of_the_whole_window() {
+        let (batch, across) = (3, 8_i64);
+        let store = tch::nn::VarStore::new(Device::Cpu);
+        tch::manual_seed(1);
+        let net = PushNet::new(&store.root(), 8);
+        let random = |channels: usize| Tensor::rand([batch, channels as i64, 16, across], (Kind::Float, Device::Cpu));
+        let evidence = || Evidence { occupancy: random(2 * OCCUPANCY), semantics: random(SEMANTICS) };
+        let planes = PushPlanes { swept: random(OCCUPANCY), marks: random(MARKS), arriving: evidence() };
+        let prior = evidence();
+        let parts = net.prior_parts(&prior);
+        let Pushed { occupancy, semantics, change } = net.forward(&parts, &prior, &planes);
+
+        let body = net.body(&parts, &planes);
+        assert!(body.change.equal(&change));
+        let pixels = Pixels::new(&[0, 0, 2, 1], &[5, 77, 0, 127], Device::Cpu);
+        let (some_occupancy, some_semantics) = net.heads(
+            &body.at(&pixels),
+            &pixels.of_evidence(&prior),
+            &pixels.of(&planes.swept),
+            &pixels.of_evidence(&planes.arriving),
+        );
+        for (some, whole) in [(some_occupancy, occupancy), (some_semantics, semantics)] {
+            let off = (some - pixels.of(&whole)).abs().max().double_value(&[]);
+            assert!(off < 1e-4, "{off}");
+        }
+        // The order of pixels is the one asked for.
+        let at = change.double_value(&[2, 3, 0, 0]);
+        assert_eq!(pixels.of(&change).double_value(&[0, 3, 2, 0]), at);
+        let at = change.double_value(&[0, 1, 77 / across, 77 % across]);
+        assert_eq!(pixels.of(&change).double_value(&[0, 1, 1, 0]), at);
+    }
+
+    #[test]
+    fn evidence_of_pixels_is_limited_as_that_of_planes() {
+        for z in [[9.0_f32, 1.0, 12.0], [6.5, -3.0, 2.0], [7.5, 7.5, 7.5]] {
+            let planes = super::super::observe_net::limited(&Tensor::from_slice(&z).reshape([1, 3, 1, 1]), 3);
+            let planes = values(&(planes.exp() + 1.0));
+            assert!(evidence(z).iter().zip(&planes).all(|(a, b)| (a - b).abs() < 1e-3 * b), "{z:?} {planes:?}");
+        }
+    }
 
     #[test]
     fn a_gate_mixes_probabilities_and_not_evidence() {

@@ -3,15 +3,17 @@
 //!
 //! The network sees a window of the floor plan around the push: as wide as the tool and what it moves can reach, and as
 //! deep as the shelf. Its stem is made of 1 x 1 convolutions, so the prior's part is computed once for all candidates of a
-//! decision and cut out per window. As in sigma_o the prior leads past the U-Net to the heads.
+//! decision and cut out per window. As in sigma_o the prior leads past the U-Net to the heads. These look at one pixel at a
+//! time, so that they are computed only where something is likely to change.
 //!
 //! Convolutions are bad at carrying a class or a height over 10 cm of floor. So the network is also shown a guess: the
 //! evidence of what the tool meets first, moved with the tool (the classical rule's guess, without a turn and without
 //! what is pushed in turn). It leads past the U-Net too; what becomes of it is learnt.
 
 use super::layout::{OCCUPANCY, SEMANTICS, SUBS};
-use super::net::{UNet, conv};
+use super::net::{Network, UNet, conv};
 use super::observe_net::Evidence;
+use std::ops::Range;
 use tch::Tensor;
 use tch::nn::{self, Module};
 
@@ -22,19 +24,6 @@ pub(super) const MARKS: usize = 4 * SUBS;
 /// Planes of the change of floor cells: for and against.
 const CHANGE: usize = 2 * SUBS;
 
-/// What the network's size is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PushConfig {
-    /// Channels of the U-Net's first level; a multiple of 8.
-    pub width: i64,
-}
-
-impl Default for PushConfig {
-    fn default() -> Self {
-        Self { width: 24 }
-    }
-}
-
 /// What the heads give: `z` with `a = 1 + e^z`.
 #[derive(Debug)]
 pub struct Pushed {
@@ -44,6 +33,74 @@ pub struct Pushed {
     pub semantics: Tensor,
     /// `[B, 2 * 4, WINDOW, Y]`: for and against that a floor cell changes.
     pub change: Tensor,
+}
+
+/// The prior's part of what is computed, over the whole floor plan: once for all candidates of a decision.
+#[derive(Debug)]
+pub struct PriorParts {
+    stem: Tensor,
+    labels: Tensor,
+}
+
+impl PriorParts {
+    /// Cut to windows, one above the other.
+    pub(crate) fn windows(&self, xs: &[Range<usize>]) -> Self {
+        Self { stem: windows(&self.stem, xs), labels: windows(&self.labels, xs) }
+    }
+
+    /// Those of several scenes, one above the other.
+    pub(crate) fn stacked(parts: &[Self]) -> Self {
+        let of = |part: fn(&Self) -> &Tensor| Tensor::cat(&parts.iter().map(part).collect::<Vec<_>>(), 0);
+        Self { stem: of(|parts| &parts.stem), labels: of(|parts| &parts.labels) }
+    }
+}
+
+/// Planes `[1, C, X, Y]` cut to windows, one above the other: `[B, C, WINDOW, Y]`.
+pub(crate) fn windows(planes: &Tensor, xs: &[Range<usize>]) -> Tensor {
+    let cut: Vec<Tensor> = xs.iter().map(|x| planes.narrow(2, x.start as i64, x.len() as i64)).collect();
+    Tensor::cat(&cut, 0)
+}
+
+/// What the network knows of every pixel before its heads, which look at one pixel at a time.
+#[derive(Debug)]
+pub(super) struct Body {
+    features: Tensor,
+    labels: Tensor,
+    /// As in [`Pushed`].
+    pub(super) change: Tensor,
+}
+
+/// Some pixels of windows: which window each is in, and which pixel of it.
+#[derive(Debug)]
+pub(super) struct Pixels {
+    window: Tensor,
+    pixel: Tensor,
+}
+
+impl Pixels {
+    pub(super) fn new(window: &[i64], pixel: &[i64], device: tch::Device) -> Self {
+        let tensor = |numbers: &[i64]| Tensor::from_slice(numbers).to_device(device);
+        Self { window: tensor(window), pixel: tensor(pixel) }
+    }
+
+    /// These pixels of planes `[B, C, X, Y]`, as planes `[1, C, N, 1]`.
+    pub(super) fn of(&self, planes: &Tensor) -> Tensor {
+        let size = planes.size();
+        let [window, pixel] = [&self.window, &self.pixel].map(|index| Some(index.shallow_clone()));
+        let chosen = planes.reshape([size[0], size[1], -1]).index(&[window, None, pixel]);
+        chosen.transpose(0, 1).reshape([1, size[1], -1, 1])
+    }
+
+    pub(super) fn of_evidence(&self, evidence: &Evidence) -> Evidence {
+        Evidence { occupancy: self.of(&evidence.occupancy), semantics: self.of(&evidence.semantics) }
+    }
+}
+
+impl Body {
+    pub(super) fn at(&self, pixels: &Pixels) -> Self {
+        let of = |planes: &Tensor| pixels.of(planes);
+        Self { features: of(&self.features), labels: of(&self.labels), change: of(&self.change) }
+    }
 }
 
 /// What pushes look like, in windows.
@@ -63,10 +120,7 @@ impl PushPlanes {
         Self {
             swept: self.swept.to_device(device),
             marks: self.marks.to_device(device),
-            arriving: Evidence {
-                occupancy: self.arriving.occupancy.to_device(device),
-                semantics: self.arriving.semantics.to_device(device),
-            },
+            arriving: self.arriving.to_device(device),
         }
     }
 }
@@ -98,11 +152,12 @@ pub struct PushNet {
     arriving_semantics: Tensor,
 }
 
-impl PushNet {
-    /// The network with its variables under `path`.
-    pub fn new(path: &nn::Path<'_>, config: PushConfig) -> Self {
+impl Network for PushNet {
+    const NAME: &str = "sigma_m";
+
+    fn new(path: &nn::Path<'_>, width: i64) -> Self {
         let (occupancy, semantics) = (2 * OCCUPANCY as i64, SEMANTICS as i64);
-        let (stem, width) = (2 * config.width, config.width);
+        let stem = 2 * width;
         let per_channel =
             |name: &str, channels: i64, value: f64| path.var(name, &[1, channels, 1, 1], nn::Init::Const(value));
         let small = |name: &str, to: i64, bias: f64| {
@@ -136,36 +191,54 @@ impl PushNet {
             arriving_semantics: per_channel("arriving_semantics", semantics, 0.5),
         }
     }
+}
 
-    /// The prior's part of the stem, over the whole floor plan.
-    pub fn prior_stem(&self, prior: &Evidence) -> Tensor {
-        prior.occupancy.apply(&self.stem_prior) + prior.semantics.apply(&self.stem_semantics)
+impl PushNet {
+    /// The prior's part, over the whole floor plan.
+    pub fn prior_parts(&self, prior: &Evidence) -> PriorParts {
+        PriorParts {
+            stem: prior.occupancy.apply(&self.stem_prior) + prior.semantics.apply(&self.stem_semantics),
+            labels: prior.semantics.apply(&self.semantic_prior),
+        }
     }
 
-    /// The prediction from the prior's stem and the prior, both cut to the windows, and the pushes.
-    pub fn forward(&self, prior_stem: &Tensor, prior: &Evidence, pushes: &PushPlanes) -> Pushed {
+    /// The prediction from the prior's parts and the prior, both cut to the windows, and the pushes.
+    pub fn forward(&self, parts: &PriorParts, prior: &Evidence, pushes: &PushPlanes) -> Pushed {
+        let body = self.body(parts, pushes);
+        let (occupancy, semantics) = self.heads(&body, prior, &pushes.swept, &pushes.arriving);
+        Pushed { occupancy, semantics, change: body.change }
+    }
+
+    /// Everything that looks beyond a pixel.
+    pub(super) fn body(&self, parts: &PriorParts, pushes: &PushPlanes) -> Body {
         let PushPlanes { swept, marks, arriving } = pushes;
-        let stem = prior_stem
+        let mut stem = &parts.stem
             + swept.apply(&self.stem_swept)
             + marks.apply(&self.stem_marks)
             + arriving.occupancy.apply(&self.stem_arriving)
             + arriving.semantics.apply(&self.stem_labels);
-        let features = self.unet.forward(&stem.relu());
-        let occupancy = features
+        let features = self.unet.forward(&stem.relu_());
+        let mut mixed =
+            features.apply(&self.semantic_mix) + &parts.labels + arriving.semantics.apply(&self.semantic_arriving);
+        let mixed = mixed.relu_();
+        let labels = mixed.apply(&self.semantic_inner).relu_() + mixed;
+        let change = features.apply(&self.change_inner).relu_().apply(&self.change_head);
+        Body { features, labels, change }
+    }
+
+    /// Occupancy and semantics from the body, the prior and the pushes, all at the same pixels: of whole windows, or some.
+    pub(super) fn heads(&self, body: &Body, prior: &Evidence, swept: &Tensor, arriving: &Evidence) -> (Tensor, Tensor) {
+        let occupancy = body
+            .features
             .apply(&self.occupancy_head)
             .addcmul(&self.keep_occupancy, &prior.occupancy)
             .addcmul(&self.arriving_occupancy, &arriving.occupancy)
             .addcmul(&self.swept, &Tensor::cat(&[swept, swept], 1));
-        let mixed = features.apply(&self.semantic_mix)
-            + prior.semantics.apply(&self.semantic_prior)
-            + arriving.semantics.apply(&self.semantic_arriving);
-        let mixed = mixed.relu();
-        let inner = mixed.apply(&self.semantic_inner).relu_() + mixed;
-        let semantics = inner
+        let semantics = body
+            .labels
             .apply(&self.semantic_head)
             .addcmul(&self.keep_semantics, &prior.semantics)
             .addcmul(&self.arriving_semantics, &arriving.semantics);
-        let change = features.apply(&self.change_inner).relu_().apply(&self.change_head);
-        Pushed { occupancy, semantics, change }
+        (occupancy, semantics)
     }
 }

@@ -4,10 +4,10 @@
 //! classical rule predicts them, on the belief that sigma_o made.
 
 use super::layout::{LABELS, Layout, Mirror, OCCUPANCY, SEMANTICS};
-use super::observe_net::{Evidence, ObserveConfig, ObserveNet};
+use super::observe_net::{Evidence, ObserveNet};
 use super::predict::predict;
-use super::push_net::{PushConfig, PushNet};
-use super::weights::{self, Card};
+use super::push_net::PushNet;
+use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
 use crate::belief::{Belief, BeliefUpdate, Classical, PushPrediction, SweptPush};
 use crate::camera::MapObservation;
@@ -60,10 +60,7 @@ impl Cnabu {
         if !path.is_file() {
             return Err(Error::input(path, "", "there are no weights here (nudge train observe makes them)"));
         }
-        let card = Card::read(path, "sigma_o")?;
-        let store = VarStore::new(super::chosen_device()?);
-        let net = ObserveNet::new(&store.root(), ObserveConfig { width: card.width });
-        weights::fill(&store, &weights::read_tensors(path)?, path)?;
+        let (net, store, card) = load_network::<ObserveNet>(path, super::chosen_device()?)?;
         Ok(Self::of(net, store, card))
     }
 
@@ -72,10 +69,7 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn with_push_file(self, path: &Path) -> Result<Self> {
-        let card = Card::read(path, "sigma_m")?;
-        let store = VarStore::new(self.device());
-        let net = PushNet::new(&store.root(), PushConfig { width: card.width });
-        weights::fill(&store, &weights::read_tensors(path)?, path)?;
+        let (net, store, _) = load_network::<PushNet>(path, self.device())?;
         Ok(self.with_push(net, store))
     }
 

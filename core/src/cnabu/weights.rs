@@ -2,6 +2,7 @@
 
 use super::Scored;
 use super::layout::LEVELS;
+use super::net::Network;
 use crate::files::{TEMPORARY, write_atomically};
 use crate::scene::{CLASS_COUNT, Catalog};
 use crate::{Error, Result};
@@ -15,6 +16,8 @@ use tch::{Device, Kind, Tensor};
 
 /// Number of this kind of card and of the networks that it is about.
 const FORMAT: u32 = 1;
+/// Name of the number of updates in [`Card::training`].
+pub const UPDATES: &str = "updates";
 
 /// What weights are: which network they are of, what they were trained on, and how well they do.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -99,6 +102,11 @@ impl Card {
             ));
         }
         Ok(card)
+    }
+
+    /// Updates that the weights have behind them, as far as the card tells.
+    pub fn updates(&self) -> u64 {
+        self.training.get(UPDATES).and_then(|updates| updates.parse().ok()).unwrap_or(0)
     }
 
     /// Writes the card beside `weights`.
@@ -195,8 +203,20 @@ fn one_line(error: &tch::TchError) -> String {
     error.to_string().lines().next().unwrap_or_default().to_owned()
 }
 
+/// A network with its weights from a file, its variables, and the card beside it.
+///
+/// # Errors
+/// For weights that are missing, damaged, not finite, or of another network, grid, class list or version.
+pub fn load_network<N: Network>(path: &Path, device: Device) -> Result<(N, VarStore, Card)> {
+    let card = Card::read(path, N::NAME)?;
+    let store = VarStore::new(device);
+    let net = N::new(&store.root(), card.width);
+    fill(&store, &read_tensors(path)?, path)?;
+    Ok((net, store, card))
+}
+
 /// Copies tensors into the variables of a network; all must be there, of the right shape, and finite.
-pub(crate) fn fill(store: &VarStore, tensors: &BTreeMap<String, Tensor>, path: &Path) -> Result<()> {
+fn fill(store: &VarStore, tensors: &BTreeMap<String, Tensor>, path: &Path) -> Result<()> {
     let variables: BTreeMap<String, Tensor> = store.variables().into_iter().collect();
     for (name, variable) in &variables {
         let tensor = tensors.get(name).ok_or_else(|| Error::input(path, name.as_str(), "is missing"))?;

@@ -95,6 +95,34 @@ impl GainField {
         }
     }
 
+    /// This field without skip levels: rays walk it voxel by voxel, and a window of it can be written over as it is.
+    pub(super) fn flat(&self) -> Self {
+        let codes = self.codes.iter().map(|code| if skip::is_transparent(*code) { 0 } else { *code }).collect();
+        Self { layout: self.layout, codes, seen: None }
+    }
+
+    /// Writes a prediction over a [flat](Self::flat) field.
+    pub(super) fn overwrite(&mut self, prediction: &PushPrediction) {
+        let quantiser = Quantiser::get();
+        let height = self.layout.grid.dims[2];
+        let predicted = prediction.occupancy.chunks_exact(height);
+        for (cell, betas) in prediction.window.cells(&self.layout.grid).zip(predicted) {
+            let column = self.layout.column(cell);
+            for (code, beta) in self.codes[column..column + height].iter_mut().zip(betas) {
+                *code = quantiser.code(beta_mean(*beta));
+            }
+        }
+    }
+
+    /// Makes a window again what it is in `original`.
+    pub(super) fn restore(&mut self, original: &Self, window: Window) {
+        let height = self.layout.grid.dims[2];
+        for cell in window.cells(&self.layout.grid) {
+            let column = self.layout.column(cell);
+            self.codes[column..column + height].copy_from_slice(&original.codes[column..column + height]);
+        }
+    }
+
     /// This field with a prediction, and the box of the voxels that changed in it.
     pub(super) fn patched(&self, prediction: &PushPrediction) -> (Self, Option<VoxelBox>) {
         let mut field = self.clone();
@@ -173,6 +201,11 @@ impl Layout {
     /// Position of a voxel in the padded grid.
     pub fn at(&self, voxel: [usize; 3]) -> usize {
         (voxel[0] + 1) * self.stride[0] + (voxel[1] + 1) * self.stride[1] + voxel[2]
+    }
+
+    /// Position in the padded grid of a floor cell's lowest voxel.
+    pub fn column(&self, cell: usize) -> usize {
+        self.at([cell / self.grid.dims[1], cell % self.grid.dims[1], 0])
     }
 
     /// Position in the padded grid of the voxel at `index` in arrays over voxels.

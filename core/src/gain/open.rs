@@ -3,7 +3,8 @@
 //! A push is not worth it for the one look that follows: what was in view before can be looked at without it. It is worth
 //! it for the space that it opens to all views together, each voxel counted once:
 //! `sum_k H(p'_k) max(0, V'_k - max(V_k, S_k))` over voxels `k`, where `p'` is the predicted belief, `V_k` and `V'_k` tell
-//! whether any ray of any view reaches the voxel before and after the push, and `S_k` whether a look has seen it.
+//! whether any ray of any view reaches the voxel before and after the push, and `S_k` whether a look has seen it or it is
+//! believed to be free (`p < 0.05`): what a push makes uncertain of those is no gain.
 //!
 //! A ray is taken to pass where the likeliest map is free (`p < 0.5`). Under the expected transmittance of
 //! [`super::gain_of_views`] a chamber that nobody has looked into closes itself after a few voxels of `p = 0.3`, so that
@@ -11,75 +12,83 @@
 
 use super::RayDensity;
 use super::code::{LIKELIEST, Matter};
-use super::field::{GainField, VoxelBox};
-use super::ray::{Camera, Tally};
-use super::rescore::Reached;
+use super::field::GainField;
+use super::ray::{Camera, Ray, Tally};
+use super::skip::is_transparent;
 use crate::belief::PushPrediction;
 use crate::camera::{ViewArray, ViewId};
 use rayon::prelude::*;
 
-/// What all views together reach under one field, so that under a prediction only those rays are walked again that can
-/// meet a changed voxel.
+/// What all views together reach under one field, so that under a prediction only those rays are walked that are no
+/// longer stopped where they were: no other reaches anything new.
 pub struct Openings {
+    /// Without skip levels: few rays are walked, and to keep the levels right would cost more than stepping.
     field: GainField,
-    density: RayDensity,
-    /// Per view what each of its rays crosses, by ray number.
-    views: Vec<(Camera, Vec<Reached>)>,
-    /// Per voxel of the padded grid whether a ray reaches it or a look has seen it: 1 or 0, or a share between.
+    /// What stops each ray, a position in the padded grid.
+    stops: Vec<usize>,
+    /// Each ray where it enters.
+    rays: Vec<Ray>,
+    /// Per voxel of the padded grid whether a ray reaches it, a look has seen it, or it is believed to be free: 1 or 0, or a
+    /// share between.
     open: Vec<f32>,
 }
+
+/// Pushes that share what is allocated for them, at least.
+const MIN_TOGETHER: usize = 8;
+
+/// What some of the views reach.
+type Walked = (Vec<usize>, Vec<Ray>, Vec<f32>);
 
 impl Openings {
     /// Walks all rays of the given views.
     pub fn new(field: &GainField, array: &ViewArray, ids: &[ViewId], density: RayDensity) -> Self {
-        let seen = || field.seen.as_ref().map_or_else(|| vec![0.0; field.codes.len()], |seen| seen.to_vec());
-        let walked = ids.par_iter().fold(
-            || (Vec::new(), seen()),
-            |(mut views, mut open), &id| {
-                let camera = Camera::of(field, array, id);
-                let [across, down] = camera.rays(density);
-                let mut reached = vec![Reached::NOTHING; across * down];
-                camera.for_each_ray(field, density, |number, ray| {
-                    let mut tally = Open { open: &mut open, last: 0 };
-                    ray.walk(field, &mut tally);
-                    let last = tally.last;
-                    if let Some(entering) = camera.ray(field, density, [number / down, number % down]) {
-                        reached[number] = Reached::between(field, &entering, last);
-                    }
-                });
-                views.push((camera, reached));
-                (views, open)
-            },
-        );
-        let (views, open) = walked.reduce(
-            || (Vec::new(), Vec::new()),
-            |(mut views, open), (others, other)| {
-                views.extend(others);
-                let larger = |(a, b): (f32, &f32)| a.max(*b);
-                let open = if open.is_empty() { other } else { open.into_iter().zip(&other).map(larger).collect() };
-                (views, open)
-            },
-        );
-        Self { field: field.clone(), density, views, open }
+        let free: Vec<f32> = field.codes.iter().map(|code| f32::from(u8::from(is_transparent(*code)))).collect();
+        let open = match &field.seen {
+            None => free,
+            Some(seen) => free.iter().zip(seen.iter()).map(|(free, seen)| free.max(*seen)).collect(),
+        };
+        let begin = || (Vec::new(), Vec::new(), open.clone());
+        let walk = |(mut stops, mut rays, mut open): Walked, &id: &ViewId| {
+            let camera = Camera::of(field, array, id);
+            let down = camera.rays(density)[1];
+            camera.for_each_ray(field, density, |number, ray| {
+                let mut tally = Open { open: &mut open, stop: 0 };
+                ray.walk(field, &mut tally);
+                // From its entry on: something may come to stand where it passed.
+                if let Some(entering) = camera.ray(field, density, [number / down, number % down]) {
+                    stops.push(tally.stop);
+                    rays.push(entering);
+                }
+            });
+            (stops, rays, open)
+        };
+        let join = |(mut stops, mut rays, mut open): Walked, (other_stops, other_rays, other_open): Walked| {
+            stops.extend(other_stops);
+            rays.extend(other_rays);
+            open.iter_mut().zip(&other_open).for_each(|(open, other)| *open = open.max(*other));
+            (stops, rays, open)
+        };
+        let (stops, rays, open) = ids.par_iter().fold(begin, walk).reduce(begin, join);
+        Self { field: field.flat(), stops, rays, open }
     }
 
-    /// What a push opens, nats.
-    pub fn under(&self, prediction: &PushPrediction) -> f32 {
-        let (field, changed) = self.field.patched(prediction);
-        let Some(VoxelBox { min, max }) = changed else { return 0.0 };
-        let changed = Reached { min: min.map(|at| at as u16), max: max.map(|at| at as u16) };
-        let mut tally = Opened { open: &self.open, opened: vec![0.0; self.open.len()], nats: 0.0 };
-        for (camera, reached) in &self.views {
-            camera.for_rays(
-                &field,
-                self.density,
-                |number| reached[number].touches(&changed),
-                |_, ray| {
-                    ray.walk(&field, &mut tally);
-                },
-            );
+    /// What each of some pushes opens, nats.
+    pub fn under_each(&self, predictions: &[PushPrediction]) -> Vec<f32> {
+        let scratch = || (self.field.clone(), Opened::beyond(&self.open));
+        let of = |(field, opened): &mut (GainField, Opened<'_>), prediction| self.under(prediction, field, opened);
+        predictions.par_iter().with_min_len(MIN_TOGETHER).map_init(scratch, of).collect()
+    }
+
+    /// What a push opens; `field` is a copy of the own one, and is that again afterwards.
+    fn under(&self, prediction: &PushPrediction, field: &mut GainField, opened: &mut Opened<'_>) -> f32 {
+        field.overwrite(prediction);
+        for (stop, ray) in self.stops.iter().zip(&self.rays) {
+            if LIKELIEST[usize::from(field.codes[*stop])].pass > 0.0 {
+                ray.walk(field, opened);
+            }
         }
-        tally.nats as f32
+        field.restore(&self.field, prediction.window);
+        opened.take()
     }
 }
 
@@ -94,17 +103,17 @@ pub fn gain_together(field: &GainField, array: &ViewArray, ids: &[ViewId], densi
             &nothing[..]
         }
     };
-    let mut tally = Opened { open, opened: vec![0.0; open.len()], nats: 0.0 };
+    let mut tally = Opened::beyond(open);
     for &id in ids {
         Camera::of(field, array, id).for_each_ray(field, density, |_, ray| ray.walk(field, &mut tally));
     }
-    tally.nats as f32
+    tally.take()
 }
 
-/// Voxels that rays reach, and where the last ray ended.
+/// Voxels that rays reach, and what stopped the last ray.
 struct Open<'a> {
     open: &'a mut [f32],
-    last: usize,
+    stop: usize,
 }
 
 impl Tally for Open<'_> {
@@ -114,8 +123,10 @@ impl Tally for Open<'_> {
 
     #[inline(always)]
     fn visit(&mut self, index: usize, _information: f32, transmittance: f32) {
-        self.open[index] = self.open[index].max(transmittance);
-        self.last = index;
+        if transmittance > 0.0 {
+            self.open[index] = self.open[index].max(transmittance);
+            self.stop = index;
+        }
     }
 }
 
@@ -123,7 +134,21 @@ impl Tally for Open<'_> {
 struct Opened<'a> {
     open: &'a [f32],
     opened: Vec<f32>,
+    /// Where `opened` is not 0.
+    touched: Vec<usize>,
     nats: f64,
+}
+
+impl<'a> Opened<'a> {
+    fn beyond(open: &'a [f32]) -> Self {
+        Self { open, opened: vec![0.0; open.len()], touched: Vec::new(), nats: 0.0 }
+    }
+
+    /// The sum, nats, after which nothing is opened any more.
+    fn take(&mut self) -> f32 {
+        self.touched.drain(..).for_each(|index| self.opened[index] = 0.0);
+        std::mem::take(&mut self.nats) as f32
+    }
 }
 
 impl Tally for Opened<'_> {
@@ -135,6 +160,9 @@ impl Tally for Opened<'_> {
     fn visit(&mut self, index: usize, information: f32, transmittance: f32) {
         let more = (transmittance - self.open[index].max(self.opened[index])).max(0.0);
         if more > 0.0 {
+            if self.opened[index] == 0.0 {
+                self.touched.push(index);
+            }
             self.opened[index] = transmittance;
             self.nats += f64::from(more * information);
         }
@@ -170,7 +198,7 @@ mod tests {
         let mut set = VoxelSet::empty(&belief.grid);
         seen.iter().for_each(|&voxel| set.insert(voxel));
         let field = GainField::new(&belief).with_seen(&set);
-        Openings::new(&field, &array, &[ViewId(0)], EVERY).under(&prediction)
+        Openings::new(&field, &array, &[ViewId(0)], EVERY).under_each(&[prediction])[0]
     }
 
     #[test]
@@ -185,7 +213,7 @@ mod tests {
         near(opened(&[0.97, 0.3, 0.3], &[0.01, 0.3, 0.3], &[1]), h3);
         // A thing that comes in the way opens nothing, nor does one that blurs.
         assert_eq!(opened(&[0.01, 0.3, 0.3], &[0.97, 0.3, 0.3], &[]), 0.0);
-        assert_eq!(opened(&[0.01, 0.3, 0.3], &[0.4, 0.3, 0.3], &[0]), 0.0);
+        assert_eq!(opened(&[0.01, 0.3, 0.3], &[0.4, 0.3, 0.3], &[]), 0.0);
         assert_eq!(opened(&[0.01, 0.3, 0.3], &[0.01, 0.3, 0.3], &[]), 0.0);
     }
 
@@ -203,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn walking_only_rays_that_meet_a_change_leaves_nothing_out() {
+    fn walking_only_rays_that_go_on_leaves_nothing_out() {
         let (grid, array) = (small_grid(), standard());
         let ids: Vec<ViewId> = (0..300).step_by(29).map(ViewId).collect();
         let density = RayDensity { stride_px: 24 };
@@ -211,7 +239,7 @@ mod tests {
             let mut open = vec![0.0; field.codes.len()];
             for &id in &ids {
                 Camera::of(field, &array, id).for_each_ray(field, density, |_, ray| {
-                    ray.walk(field, &mut Open { open: &mut open, last: 0 });
+                    ray.walk(field, &mut Open { open: &mut open, stop: 0 });
                 });
             }
             open
@@ -228,13 +256,15 @@ mod tests {
             };
             let field = GainField::new(&belief);
             let after = field.with_prediction(&prediction);
+            let mut was = reach(&field);
+            was.iter_mut().zip(&field.codes).filter(|(_, code)| is_transparent(**code)).for_each(|(was, _)| *was = 1.0);
             let expected: f64 = reach(&after)
                 .iter()
-                .zip(reach(&field))
+                .zip(was)
                 .zip(&after.codes)
                 .map(|((now, was), code)| f64::from((now - was).max(0.0) * MATTER[usize::from(*code)].information))
                 .sum();
-            let opened = Openings::new(&field, &array, &ids, density).under(&prediction);
+            let opened = Openings::new(&field, &array, &ids, density).under_each(&[prediction])[0];
             assert!((f64::from(opened) - expected).abs() < 1e-4 * (1.0 + expected), "{opened} is not {expected}");
             total += expected;
         }

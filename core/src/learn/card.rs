@@ -11,7 +11,7 @@ use std::path::Path;
 /// File name of the card.
 pub const NAME: &str = "card.toml";
 /// Number of this layout of directory and records.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// What a directory's samples are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,6 +1,6 @@
 //! How well a belief update does on held-out scenes, against the number of views.
 
-use super::{Dataset, MapSample, PushSample, VIEWS};
+use super::{Dataset, MapSample, PushSample, VIEWS, VIEWS_AFTER, ViewSample};
 use crate::Result;
 use crate::belief::{Belief, BeliefUpdate};
 use crate::grid::{Grid, VoxelSet};
@@ -69,6 +69,39 @@ pub fn evaluate_pushes(
             let mut after = belief.clone();
             after.apply(&prediction);
             tallies.predicted.merge(&Tally::of_cells(&after, &truth, &changed));
+        }
+        progress(at + 1);
+    }
+    Ok(tallies)
+}
+
+/// Counts on the whole map after the first push of every sample: entry `v` is of the belief that was predicted, updated with
+/// `v` views of what the push left.
+///
+/// `progress` is told how many samples are done.
+///
+/// # Errors
+/// When a sample cannot be read.
+pub fn evaluate_after_pushes(
+    data: &Dataset<PushSample>,
+    update: &dyn BeliefUpdate,
+    progress: &mut dyn FnMut(usize),
+) -> Result<Vec<Tally>> {
+    let grid = data.grid();
+    let mut tallies = vec![Tally::default(); VIEWS_AFTER + 1];
+    for at in 0..data.len() {
+        let sample = data.get(at)?;
+        let Some(pushed) = sample.pushes.first() else { continue };
+        let truth = truth_map(&grid, &pushed.truth, &pushed.labels);
+        let look = |belief: Belief, view: &ViewSample| update.observe(&belief, &view.observation);
+        let mut belief = sample.views.iter().fold(Belief::uniform(grid), look);
+        for prediction in update.predict_pushes(&belief, std::slice::from_ref(&pushed.push)) {
+            belief.apply(&prediction);
+        }
+        tallies[0].merge(&Tally::of(&belief, &truth));
+        for (tally, view) in tallies[1..].iter_mut().zip(&sample.after) {
+            belief = look(belief, view);
+            tally.merge(&Tally::of(&belief, &truth));
         }
         progress(at + 1);
     }

@@ -6,6 +6,9 @@
 //!
 //! sigma_m is asked twice about a push: when it is weighed, with what it is planned to sweep, and when it is done, with
 //! what it really swept. The two differ where the arm was blocked; of such pushes, every other sample has the latter.
+//!
+//! What some views see after the first of a sample's pushes is kept too: sigma_o has to learn how much of a predicted
+//! belief to believe.
 
 use super::bytes::{Reader, put_set};
 use super::maps::{occupied, put_views, take_views};
@@ -16,12 +19,14 @@ use crate::arm::Push;
 use crate::belief::{Belief, BeliefUpdate, Classical, SweptPush};
 use crate::grid::{Grid, VoxelSet};
 use crate::push::{self, Candidate};
-use crate::rng::stream;
+use crate::rng::{derived_seed, stream};
 use crate::world::{TruthMap, World};
 use rand::Rng;
 
 /// Pushes that a sample holds at most.
 pub const PUSHES: usize = 4;
+/// Views after the first of a sample's pushes.
+pub const VIEWS_AFTER: usize = 4;
 /// Scenes that are tried for one whose belief offers a push.
 const TRIES: u64 = 8;
 
@@ -40,8 +45,9 @@ pub struct PushedSample {
 ///
 /// Its record is `seed` u64, `view_count` and `push_count` u16, `views` u16 x 10, `pushes` f32 x 4 x 5 (start x y z in
 /// metres, direction in degrees, length in metres), then `labels`, `truth`, `view_labels`, `free`, `occupied` as in a map
-/// sample, and `swept`, `truth_after` (bits per push and voxel), `labels_after` (u8 per push and floor cell). Unused views and
-/// pushes are zero.
+/// sample, `swept`, `truth_after` (bits per push and voxel), `labels_after` (u8 per push and floor cell), and of the views
+/// after the first push `views_after` u16 x 4, `view_labels_after`, `free_after`, `occupied_after` as before. Unused views
+/// and pushes are zero.
 #[derive(Clone, Debug)]
 pub struct PushSample {
     /// The sample's own seed.
@@ -54,6 +60,8 @@ pub struct PushSample {
     pub views: Vec<ViewSample>,
     /// One to [`PUSHES`] pushes, each from the same state.
     pub pushes: Vec<PushedSample>,
+    /// [`VIEWS_AFTER`] views after the first push, if there is one.
+    pub after: Vec<ViewSample>,
 }
 
 impl PushSample {
@@ -83,30 +91,49 @@ impl PushSample {
             views.iter().fold(Belief::uniform(grid), |belief, view| Classical.observe(&belief, &view.observation));
         let mut rng = stream(scene_seed, "sample pushes", 0);
         let candidates = push::sample(&belief, &recipe.arm, PUSHES, &mut rng);
-        let pushes = candidates
-            .into_iter()
-            .filter(|candidate| candidate.rejection.is_none())
-            .filter_map(|candidate| pushed(&grid, &world, &recipe.arm, candidate, seed % 2 == 1))
-            .collect();
-        Ok(Self { seed, truth: occupied(&grid, &truth), labels: truth.labels, views, pushes })
+        let (mut pushes, mut after) = (Vec::new(), Vec::new());
+        for candidate in candidates.into_iter().filter(|candidate| candidate.rejection.is_none()) {
+            let mut world = world.clone();
+            let Some(push) = carry_out(&mut world, &recipe.arm, candidate, seed % 2 == 1, &grid) else { continue };
+            let bodies = world.bodies();
+            if pushes.is_empty() {
+                let seed = derived_seed(scene_seed, "views after", 0);
+                after = recipe.look(world.shelf(), &bodies, VIEWS_AFTER, seed)?;
+            }
+            let truth = TruthMap::of(&grid, &bodies);
+            pushes.push(PushedSample { push, truth: occupied(&grid, &truth), labels: truth.labels });
+        }
+        Ok(Self { seed, truth: occupied(&grid, &truth), labels: truth.labels, views, pushes, after })
     }
 }
 
-/// Carries out a push in a copy of the world, and says what it was planned to sweep or, `as_done`, what it really swept;
-/// `None` when an object drops.
-fn pushed(grid: &Grid, world: &World, arm: &ArmTool, candidate: Candidate, as_done: bool) -> Option<PushedSample> {
-    let mut world = world.clone();
+/// Carries out a push, and says what it was planned to sweep or, `as_done`, what it really swept; `None` when an object
+/// drops.
+fn carry_out(world: &mut World, arm: &ArmTool, candidate: Candidate, as_done: bool, grid: &Grid) -> Option<SweptPush> {
     let outcome = world.execute(&arm.arm, candidate.motion.as_ref()?);
     if !outcome.dropped.is_empty() {
         return None;
     }
-    let push = if as_done && outcome.stalled {
-        SweptPush::done(&candidate.swept.push, &outcome, &arm.arm, grid)
-    } else {
-        candidate.swept
-    };
-    let truth = TruthMap::of(grid, &world.bodies());
-    Some(PushedSample { push, truth: occupied(grid, &truth), labels: truth.labels })
+    let done = as_done && outcome.stalled;
+    Some(if done { SweptPush::done(&candidate.swept.push, &outcome, &arm.arm, grid) } else { candidate.swept })
+}
+
+/// Appends zeros.
+fn pad(out: &mut Vec<u8>, count: usize) {
+    out.resize(out.len() + count, 0);
+}
+
+/// Appends views as [`put_views`], each part padded to that of `count` views.
+fn put_padded(out: &mut Vec<u8>, views: &[ViewSample], count: usize, sample: &PushSample) {
+    let (cells, bits) = (sample.labels.len(), sample.truth.words().len() * 8);
+    let mut packed = Vec::new();
+    put_views(&mut packed, views);
+    let (labels, sets) = packed.split_at(views.len() * cells);
+    let (free, occupied) = sets.split_at(views.len() * bits);
+    for (part, size) in [(labels, cells), (free, bits), (occupied, bits)] {
+        out.extend(part);
+        pad(out, (count - views.len()) * size);
+    }
 }
 
 impl Sample for PushSample {
@@ -118,7 +145,7 @@ impl Sample for PushSample {
             if !sample.pushes.is_empty() {
                 break;
             }
-            sample = Self::attempt(recipe, seed, crate::rng::derived_seed(seed, "push scene", attempt))?;
+            sample = Self::attempt(recipe, seed, derived_seed(seed, "push scene", attempt))?;
         }
         Ok(sample)
     }
@@ -139,25 +166,18 @@ impl Sample for PushSample {
         }
         out.extend(&self.labels);
         put_set(&mut out, &self.truth);
-        // Padded to the record's fixed size: what is missing is zero.
+        put_padded(&mut out, &self.views, VIEWS, self);
         let (cells, bits) = (self.labels.len(), self.truth.words().len() * 8);
-        let pad = |out: &mut Vec<u8>, missing: usize, size: usize| out.resize(out.len() + missing * size, 0);
-        let missing = VIEWS - self.views.len();
-        let mut views = Vec::new();
-        put_views(&mut views, &self.views);
-        let (labels, sets) = views.split_at(self.views.len() * cells);
-        let (free, occupied) = sets.split_at(self.views.len() * bits);
-        for (part, size) in [(labels, cells), (free, bits), (occupied, bits)] {
-            out.extend(part);
-            pad(&mut out, missing, size);
-        }
         let missing = PUSHES - self.pushes.len();
         self.pushes.iter().for_each(|pushed| put_set(&mut out, &pushed.push.swept));
-        pad(&mut out, missing, bits);
+        pad(&mut out, missing * bits);
         self.pushes.iter().for_each(|pushed| put_set(&mut out, &pushed.truth));
-        pad(&mut out, missing, bits);
+        pad(&mut out, missing * bits);
         self.pushes.iter().for_each(|pushed| out.extend(&pushed.labels));
-        pad(&mut out, missing, cells);
+        pad(&mut out, missing * cells);
+        let ids = (0..VIEWS_AFTER).map(|at| self.after.get(at).map_or(0, |view| view.view.0));
+        out.extend(ids.flat_map(u16::to_le_bytes));
+        put_padded(&mut out, &self.after, VIEWS_AFTER, self);
         out
     }
 
@@ -179,10 +199,49 @@ impl Sample for PushSample {
         let swept = (0..PUSHES).map(|_| reader.set()).collect::<Option<Vec<_>>>()?;
         let after = (0..PUSHES).map(|_| reader.set()).collect::<Option<Vec<_>>>()?;
         let labels_after = (0..PUSHES).map(|_| reader.floor()).collect::<Option<Vec<_>>>()?;
+        let ids = (0..VIEWS_AFTER).map(|_| reader.u16()).collect::<Option<Vec<_>>>()?;
+        let mut seen_after = take_views(&mut reader, &ids)?;
+        seen_after.truncate(if push_count == 0 { 0 } else { VIEWS_AFTER });
         let done = pushes.into_iter().zip(swept).zip(after.into_iter().zip(labels_after)).take(push_count);
         let pushes = done
             .map(|((push, swept), (truth, labels))| PushedSample { push: SweptPush { push, swept }, truth, labels })
             .collect();
-        reader.is_done().then_some(Self { seed, truth, labels, views, pushes })
+        reader.is_done().then_some(Self { seed, truth, labels, views, pushes, after: seen_after })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::ViewArray;
+    use crate::scene::{Catalog, GenerateConfig};
+    use std::sync::Arc;
+
+    #[test]
+    fn a_sample_survives_its_record_and_its_last_views_see_what_the_push_left() {
+        let scenes = GenerateConfig::default();
+        let recipe = Recipe {
+            catalog: Catalog::standard(),
+            arm: Arc::new(ArmTool::standard(scenes.shelf)),
+            scenes,
+            views: ViewArray::named("standard300").expect("shipped"),
+            noise_share: 0.0,
+        };
+        let sample = PushSample::simulate(&recipe, 3).expect("simulated");
+        assert!(!sample.pushes.is_empty() && sample.after.len() == VIEWS_AFTER);
+        let back = PushSample::from_bytes(&recipe.grid(), &sample.to_bytes()).expect("a record");
+        assert_eq!((&back.views, &back.after), (&sample.views, &sample.after));
+        assert_eq!((&back.truth, &back.labels), (&sample.truth, &sample.labels));
+        for (back, pushed) in back.pushes.iter().zip(&sample.pushes) {
+            assert_eq!((back.push.push, &back.truth, &back.labels), (pushed.push.push, &pushed.truth, &pushed.labels));
+            assert!(back.push.swept == pushed.push.swept);
+        }
+        // What the views see as free was left free by the push; something of it was not free before.
+        let seen = |truth: &VoxelSet| {
+            let free = sample.after.iter().flat_map(|view| view.observation.free.iter());
+            free.filter(|voxel| truth.contains(*voxel)).count()
+        };
+        let (before, after) = (seen(&sample.truth), seen(&sample.pushes[0].truth));
+        assert!(after * 3 < before, "{after} voxels of things are seen through, {before} of what stood there before");
     }
 }

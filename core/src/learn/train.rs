@@ -1,37 +1,32 @@
-//! Training sigma_o: recursive over random sequences of views, an update of the weights after every view.
+//! Training the networks.
 //!
-//! A batch is a few scenes; for one to `max_views` views the network turns its own last evidence, cut off from its history, and
-//! the next observation into new evidence, whose loss against the truth moves the weights at once (Adam). Occupancy's loss
-//! is taken on a random quarter of the pixels and the semantic KL on a sixteenth: transcendental functions on every voxel
-//! would cost more than the network. The weights that are shown and shipped are a running mean of the trained ones.
+//! The weights that are shown and shipped are a running mean of the trained ones.
 //!
 //! Every random choice of batch `n` comes from the stream `(seed, n)`, and a checkpoint holds weights, running mean, Adam's
 //! moments and counters: a run that is stopped and resumed is the run that was not stopped, bit for bit, on the same number
 //! of threads and the same data.
 
 mod adam;
+mod after;
 mod batch;
+mod kept;
+mod observe;
 mod push;
 mod state;
 
-pub use push::{PushLoss, PushTrainer};
+pub use after::AfterPushes;
+pub use observe::{ObserveTrainer, ViewLoss};
+pub use push::{Priors, PushLoss, PushTrainer};
 pub use state::{checkpoint_path, settings_path};
 
-use super::{Dataset, MapSample, VIEWS};
-use crate::cnabu::{
-    Card, Cnabu, Evidence, Layout, LossForm, ObserveConfig, ObserveNet, kl_to_uniform, occupancy_loss, semantics_loss,
-};
-use crate::rng::{ChaCha8Rng, stream};
-use crate::scene::CLASS_COUNT;
+use super::VIEWS;
+use crate::cnabu::{Card, Layout, Network, load_network};
 use crate::{Error, Result};
-use batch::Batch;
-use rand::Rng;
-use rand::seq::SliceRandom;
 use serde::{Deserialize, Serialize};
 use state::State;
 use std::path::Path;
 use tch::nn::VarStore;
-use tch::{Device, Kind, Tensor};
+use tch::{Device, Tensor};
 
 /// Most views that a sequence may have: as many as the longest usual episode.
 const MAX_VIEWS: usize = 40;
@@ -56,6 +51,8 @@ pub struct TrainSettings {
     pub kl_ramp: u64,
     /// Weight of the semantic loss beside that of occupancy.
     pub semantic_weight: f64,
+    /// Share of sigma_o's sequences that begin after a push, where there is data of pushes.
+    pub push_share: f64,
     /// How slowly the running mean of the weights follows: its share of the old mean.
     pub mean_decay: f64,
 }
@@ -71,6 +68,7 @@ impl Default for TrainSettings {
             kl_weight: 0.02,
             kl_ramp: 1000,
             semantic_weight: 1.0,
+            push_share: 0.0,
             mean_decay: 0.998,
         }
     }
@@ -85,6 +83,7 @@ impl TrainSettings {
             ("views", (1..=MAX_VIEWS).contains(&self.max_views), "1 to 40"),
             ("kl weight", (0.0..=10.0).contains(&self.kl_weight), "0 to 10"),
             ("semantic weight", (0.0..=100.0).contains(&self.semantic_weight), "0 to 100"),
+            ("push share", (0.0..=1.0).contains(&self.push_share), "0 to 1"),
             ("mean decay", (0.0..1.0).contains(&self.mean_decay), "0 to below 1"),
         ];
         match sane.iter().find(|(_, ok, _)| !ok) {
@@ -94,28 +93,17 @@ impl TrainSettings {
     }
 }
 
-/// The losses of one view of a batch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ViewLoss {
-    /// Number of views so far.
-    pub views: usize,
-    /// Loss of occupancy, nats per level.
-    pub occupancy: f64,
-    /// Loss of semantics, nats per floor cell.
-    pub semantics: f64,
-}
-
 /// A network in training.
 #[derive(Debug)]
-pub struct Trainer {
+pub struct Trainer<N> {
     settings: TrainSettings,
     layout: Layout,
-    net: ObserveNet,
+    net: N,
     store: VarStore,
     state: State,
 }
 
-impl Trainer {
+impl<N: Network> Trainer<N> {
     /// A network with fresh weights, for samples over the grid of `layout`.
     ///
     /// # Errors
@@ -127,7 +115,7 @@ impl Trainer {
         }
         tch::manual_seed(settings.seed as i64);
         let store = VarStore::new(device);
-        let net = ObserveNet::new(&store.root(), ObserveConfig { width: settings.width });
+        let net = N::new(&store.root(), settings.width);
         let state = State::new(&store);
         Ok(Self { settings, layout, net, store, state })
     }
@@ -148,6 +136,22 @@ impl Trainer {
     pub fn load(out: &Path, settings: TrainSettings, layout: Layout, device: Device) -> Result<Self> {
         let mut trainer = Self::new(settings, layout, device)?;
         trainer.state.load(out)?;
+        Ok(trainer)
+    }
+
+    /// Begins with weights that are finished: those in the file `weights`, with its card beside it. They count on from the
+    /// updates that they have behind them.
+    ///
+    /// # Errors
+    /// For weights that are missing, damaged, of another network, or of another width than the settings'.
+    pub fn begin_with(weights: &Path, settings: TrainSettings, layout: Layout, device: Device) -> Result<Self> {
+        let mut trainer = Self::new(settings, layout, device)?;
+        let (_, store, card) = load_network::<N>(weights, device)?;
+        let width = trainer.settings.width;
+        if card.width != width {
+            return Err(Error::input(weights, "width", format!("is {}, not {width} as asked for", card.width)));
+        }
+        trainer.state.begin_with(&store, card.updates());
         Ok(trainer)
     }
 
@@ -187,83 +191,39 @@ impl Trainer {
         self.state.parameters()
     }
 
-    /// Trains on the next batch; `rate` scales the step size (a cooldown takes it to 0). Gives the losses per view.
-    ///
-    /// # Errors
-    /// When a sample cannot be read, and [`Error::Check`] when the loss is no longer finite.
-    pub fn train(&mut self, data: &Dataset<MapSample>, rate: f64) -> Result<Vec<ViewLoss>> {
-        let mut rng = stream(self.settings.seed, "training batch", self.state.batches);
-        let views = sequence(self.settings.max_views, &mut rng);
-        let batch = Batch::draw(data, &self.layout, self.settings.batch, &mut rng)?;
-        let device = self.store.device();
-        let truth = batch.truth().to_device(device);
-        let classes = batch.classes().to_device(device);
-        let [x, y] = self.layout.pixels().map(|n| n as i64);
-        let mut evidence = Evidence::uniform(self.settings.batch as i64, [x, y], device);
-        let mut losses = Vec::with_capacity(views.len());
-        for (at, view) in views.into_iter().enumerate() {
-            let (observed, labels) = batch.view(view);
-            let (observed, labels) = (observed.to_device(device), labels.to_device(device));
-            let (z_occupancy, z_semantics) = self.net.forward(&evidence, &observed, &labels);
-            let kl =
-                self.settings.kl_weight * (self.state.updates as f64 / self.settings.kl_ramp.max(1) as f64).min(1.0);
-            let strided = |t: &Tensor, stride: i64, at: [i64; 2]| {
-                let axis = t.dim() as i64 - 2;
-                t.slice(axis, at[0], None, stride).slice(axis + 1, at[1], None, stride)
-            };
-            let quarter = [rng.random_range(0..2), rng.random_range(0..2)];
-            let sixteenth = [rng.random_range(0..4), rng.random_range(0..4)];
-            let levels = z_occupancy.size()[1] / 2;
-            let part = |first: i64| strided(&z_occupancy.narrow(1, first, levels), 2, quarter);
-            let occupancy =
-                occupancy_loss(&part(0), &part(levels), &strided(&truth, 2, quarter), LossForm::Marginal, kl, None);
-            let z_classes = z_semantics.view([self.settings.batch as i64, CLASS_COUNT as i64, -1, x, y]);
-            let semantics = semantics_loss(&z_classes, &classes, LossForm::Marginal, 0.0, None);
-            let mut loss = &occupancy + &semantics * self.settings.semantic_weight;
-            if kl > 0.0 {
-                let few = strided(&z_classes, 4, sixteenth).exp() + 1.0;
-                let wrong = few.scatter_value(1, &strided(&classes, 4, sixteenth), 1.0);
-                loss += kl_to_uniform(&wrong, 1).mean(Kind::Float) * (kl * self.settings.semantic_weight);
-            }
-            let (occupancy, semantics) = (occupancy.double_value(&[]), semantics.double_value(&[]));
-            if !(occupancy.is_finite() && semantics.is_finite()) {
-                return Err(Error::Check(format!(
-                    "training diverged: the loss of update {} is not finite",
-                    self.state.updates
-                )));
-            }
-            loss.backward();
-            self.state.update(self.settings.learning_rate * rate, self.settings.mean_decay);
-            evidence = Evidence::of_heads(&z_occupancy, &z_semantics);
-            losses.push(ViewLoss { views: at + 1, occupancy, semantics });
-        }
-        self.state.batches += 1;
-        Ok(losses)
-    }
-
-    /// The running mean of the weights as a belief update.
-    pub fn update(&self) -> Cnabu {
-        let store = VarStore::new(self.store.device());
-        let net = ObserveNet::new(&store.root(), ObserveConfig { width: self.settings.width });
-        self.state.copy_mean(&store);
-        Cnabu::of(net, store, Card::new("sigma_o", self.settings.width, self.parameters()))
-    }
-
     /// The running mean of the weights by name.
     pub fn mean_weights(&self) -> Vec<(String, Tensor)> {
         self.state.mean_weights()
     }
-}
 
-/// One to `longest` views of a sample: all of them in a random order, and then some again, as an episode goes on looking
-/// when it has seen what there is to see.
-fn sequence(longest: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
-    let length = rng.random_range(1..=longest);
-    let mut views: Vec<usize> = (0..VIEWS).collect();
-    views.shuffle(rng);
-    views.extend((VIEWS..length).map(|_| rng.random_range(0..VIEWS)));
-    views.truncate(length);
-    views
+    /// A card for the weights.
+    pub fn card(&self) -> Card {
+        Card::new(N::NAME, self.settings.width, self.parameters())
+    }
+
+    /// The network with the running mean of the weights, and its variables.
+    fn mean_net(&self) -> (N, VarStore) {
+        let store = VarStore::new(self.store.device());
+        let net = N::new(&store.root(), self.settings.width);
+        self.state.copy_mean(&store);
+        (net, store)
+    }
+
+    /// The weight of the KL term now.
+    fn kl(&self) -> f64 {
+        self.settings.kl_weight * (self.state.updates as f64 / self.settings.kl_ramp.max(1) as f64).min(1.0)
+    }
+
+    /// Moves the weights by the gradients of a loss whose `parts` are told; `rate` scales the step size.
+    fn descend(&mut self, loss: &Tensor, parts: &[f64], rate: f64) -> Result<()> {
+        if parts.iter().any(|part| !part.is_finite()) {
+            let message = format!("training diverged: the loss of update {} is not finite", self.state.updates);
+            return Err(Error::Check(message));
+        }
+        loss.backward();
+        self.state.update(self.settings.learning_rate * rate, self.settings.mean_decay);
+        Ok(())
+    }
 }
 
 #[cfg(test)]

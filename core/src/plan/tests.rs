@@ -294,7 +294,7 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
     assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
     let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
-    let opened = Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under(&prediction);
+    let opened = Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(&[prediction])[0];
     assert!(opened > 1.0 && decision.igm == opened, "{opened} {}", decision.igm);
     let best = &decision.candidates[decision.best_push.expect("a push")];
     assert!(best.gain == Some(opened) && best.view.is_some());

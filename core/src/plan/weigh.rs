@@ -11,8 +11,6 @@ use rayon::prelude::*;
 
 /// About how many views rank the candidates: every 5th of 300, all of an array that has fewer than twice as many.
 pub const COARSE_VIEWS: usize = 60;
-/// Pushes that are predicted together: enough to fill a batch and the threads, few enough to fit into memory.
-const BATCH: usize = 16;
 
 /// The pushes that were weighed.
 pub(super) struct Weighed {
@@ -33,7 +31,7 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
 /// Where all voxels count, a push is worth the best single view after it: a coarse ranking first, then the winner with all
 /// views and rays. A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones. A push
 /// clears the list of used views, so every view counts. Where only unseen voxels count, a push is worth what it opens to
-/// the coarse views together ([`Openings`]).
+/// the coarse views together ([`Openings`]), and of these the best one after the winner is named, for the eye only.
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
     let drawn = sample(belief, situation.arm, settings.candidates, &mut push_stream(situation));
@@ -50,29 +48,31 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
     let ids = |step: usize| offered.iter().copied().step_by(step).collect::<Vec<ViewId>>();
     let coarse = ids((offered.len() / COARSE_VIEWS).max(1));
     let worth = Worth::new(settings.counted, field, views, coarse);
-    let mut best: Option<usize> = None;
-    for (pushes, places) in pushes.chunks(BATCH).zip(feasible.chunks(BATCH)) {
-        let predictions = update.predict_pushes(belief, pushes);
-        for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(places) {
-            candidates[at].gain = Some(gain);
-            candidates[at].view = view;
-            candidates[at].reg = Some(disturbance(belief, prediction));
-            if best.is_none_or(|best| candidates[at].gain > candidates[best].gain) {
-                best = Some(at);
-            }
+    let predictions = update.predict_pushes(belief, &pushes);
+    let mut best: Option<(usize, &PushPrediction)> = None;
+    for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(&feasible) {
+        candidates[at].gain = Some(gain);
+        candidates[at].view = view;
+        candidates[at].reg = Some(disturbance(belief, prediction));
+        if best.is_none_or(|(best, _)| candidates[at].gain > candidates[best].gain) {
+            best = Some((at, prediction));
         }
     }
-    if let Some(at) = best {
-        let winner = feasible.iter().position(|&place| place == at).map(|i| &pushes[i..=i]).unwrap_or_default();
-        for prediction in update.predict_pushes(belief, winner) {
-            let (field, all) = (field.with_prediction(&prediction), ids(1));
-            let (view, gain) = best_view(&all, &gain_of_views(&field, views, &all, RayDensity::FULL));
-            if settings.counted == Counted::All {
-                candidates[at].gain = Some(gain);
+    let best = best.map(|(at, prediction)| {
+        let after = field.with_prediction(prediction);
+        match &worth {
+            Worth::View(..) => {
+                let all = ids(1);
+                let (view, gain) = best_view(&all, &gain_of_views(&after, views, &all, RayDensity::FULL));
+                (candidates[at].view, candidates[at].gain) = (view, Some(gain));
             }
-            candidates[at].view = view;
+            Worth::Opened(_, coarse) => {
+                let gains = gain_of_views(&after, views, coarse, RayDensity::COARSE);
+                candidates[at].view = best_view(coarse, &gains).0;
+            }
         }
-    }
+        at
+    });
     let motion = best.and_then(|at| motions[at].take());
     Weighed { candidates, best, motion }
 }
@@ -82,27 +82,32 @@ enum Worth {
     /// The best of some single views afterwards.
     View(RayGains, Vec<ViewId>),
     /// What it opens to some views together.
-    Opened(Openings),
+    Opened(Openings, Vec<ViewId>),
 }
 
 impl Worth {
     fn new(counted: Counted, field: &GainField, array: &ViewArray, coarse: Vec<ViewId>) -> Self {
         match counted {
             Counted::All => Self::View(RayGains::new(field, array, &coarse, RayDensity::COARSE), coarse),
-            Counted::Unseen => Self::Opened(Openings::new(field, array, &coarse, RayDensity::COARSE)),
+            Counted::Unseen => Self::Opened(Openings::new(field, array, &coarse, RayDensity::COARSE), coarse),
         }
     }
 
     /// The view that counts, if it is one, and the worth in nats, of every predicted push.
     fn of_each(&self, predictions: &[PushPrediction]) -> Vec<(Option<ViewId>, f32)> {
-        let of = |prediction: &PushPrediction| match self {
+        match self {
             Self::View(rays, coarse) => {
-                let (view, gain) = best_view(coarse, &rays.under(prediction));
-                (view, gain * (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2))
+                let scale = (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2);
+                let of = |prediction| {
+                    let (view, gain) = best_view(coarse, &rays.under(prediction));
+                    (view, gain * scale)
+                };
+                predictions.par_iter().map(of).collect()
             }
-            Self::Opened(openings) => (None, openings.under(prediction)),
-        };
-        predictions.par_iter().map(of).collect()
+            Self::Opened(openings, _) => {
+                openings.under_each(predictions).into_iter().map(|gain| (None, gain)).collect()
+            }
+        }
     }
 }
 

@@ -4,9 +4,9 @@ use super::{ExportArgs, Network};
 use crate::commands::{calibrate, print};
 use nudge_core::Error;
 use nudge_core::belief::Classical;
-use nudge_core::cnabu::{Card, Cnabu, Layout, OBSERVE_WEIGHTS, PUSH_WEIGHTS, Tensor, half, write_tensors};
+use nudge_core::cnabu::{Card, Cnabu, Layout, OBSERVE_WEIGHTS, PUSH_WEIGHTS, Tensor, UPDATES, half, write_tensors};
 use nudge_core::learn::{
-    Dataset, MapSample, PushSample, PushTrainer, Sample, TrainSettings, Trainer, evaluate, evaluate_pushes,
+    Dataset, MapSample, ObserveTrainer, PushSample, PushTrainer, Sample, TrainSettings, evaluate, evaluate_pushes,
 };
 use nudge_core::score::Scores;
 use serde::Serialize;
@@ -23,15 +23,15 @@ pub(super) fn run(args: &ExportArgs) -> anyhow::Result<()> {
 
 fn observe(args: &ExportArgs) -> anyhow::Result<()> {
     let test = open::<MapSample>(&args.test, args.scenes)?;
-    let settings = Trainer::logged_settings(&args.run)?;
+    let settings = ObserveTrainer::logged_settings(&args.run)?;
     let device = nudge_core::cnabu::device("cpu")?;
-    let trainer = Trainer::load(&args.run, settings.clone(), Layout::new(&test.grid())?, device)?;
+    let trainer = ObserveTrainer::load(&args.run, settings.clone(), Layout::new(&test.grid())?, device)?;
     let path = args.out.join(OBSERVE_WEIGHTS);
-    let mut card = Card::new("sigma_o", settings.width, trainer.parameters());
+    let mut card = trainer.card();
     describe::<MapSample>(&mut card, args, &test, &settings, trainer.updates())?;
     write(&path, &card, &trainer.mean_weights(), args.half)?;
     // What is scored is what was written, rounding included.
-    card.scores = calibrate::scored(&evaluate(&test, &Cnabu::load_file(&path)?, &mut |_| ())?);
+    card.scores = calibrate::scored(1, &evaluate(&test, &Cnabu::load_file(&path)?, &mut |_| ())?);
     card.write(&path)?;
     print(&format!("{}\n{}", path.display(), calibrate::table("sigma_o", &card.scores)))
 }
@@ -98,7 +98,7 @@ fn describe<S: Sample>(
     }
     card.data.insert("test".into(), command(test));
     card.training = strings(settings)?;
-    card.training.insert("updates".into(), updates.to_string());
+    card.training.insert(UPDATES.into(), updates.to_string());
     Ok(())
 }
 

@@ -2,15 +2,15 @@
 
 use super::PushArgs;
 use super::curve::Curve;
-use super::session::{Begin, Pupil};
+use super::session::Pupil;
 use nudge_core::Error;
 use nudge_core::cnabu::{self, Cnabu, Layout, OBSERVE_WEIGHTS};
-use nudge_core::learn::{Dataset, PushSample, PushTrainer, VIEWS, evaluate_pushes};
+use nudge_core::learn::{Dataset, Priors, PushSample, PushTrainer, VIEWS, evaluate_pushes};
 use std::path::{Path, PathBuf};
 
 struct Pusher {
     trainer: PushTrainer,
-    observe: Cnabu,
+    priors: Priors,
     weights: PathBuf,
     data: Dataset<PushSample>,
     val: Option<Dataset<PushSample>>,
@@ -22,22 +22,18 @@ pub(super) fn run(args: &PushArgs) -> anyhow::Result<()> {
     let shipped = || cnabu::models_dir().map(|models| models.join(OBSERVE_WEIGHTS));
     let missing = || Error::Usage("no weights of sigma_o found; --observe FILE names them".to_owned());
     let weights = args.observe.clone().or_else(shipped).ok_or_else(missing)?;
-    let observe = Cnabu::load_file(&weights)?;
+    let priors = Priors::of_network(Cnabu::load_file(&weights)?);
     let (data, val) = session.open::<PushSample>()?;
     let (settings, layout) = (session.settings(args.width, VIEWS), Layout::new(&data.grid())?);
-    let trainer = match session.begin()? {
-        Begin::Fresh => PushTrainer::new(settings, layout, device)?,
-        Begin::From(run) => PushTrainer::load(run, settings, layout, device)?,
-        Begin::Resume => PushTrainer::resume(&session.out, settings, layout, device)?,
-    };
+    let trainer: PushTrainer = session.trainer(settings, layout, device)?;
     let (parameters, updates) = (trainer.parameters(), trainer.updates());
     eprintln!("sigma_m: {parameters} parameters, {} scenes, {updates} updates so far", data.len());
-    session.run(&mut Pusher { trainer, observe, weights, data, val })
+    session.run(&mut Pusher { trainer, priors, weights, data, val })
 }
 
 impl Pupil for Pusher {
     fn train(&mut self, rate: f64, curve: &mut Curve) -> nudge_core::Result<()> {
-        let loss = self.trainer.train(&self.data, &self.observe, rate)?;
+        let loss = self.trainer.train(&self.data, &mut self.priors, rate)?;
         curve.add("occupancy", loss.occupancy);
         curve.add("semantics", loss.semantics);
         curve.add("change", loss.change);
@@ -56,7 +52,7 @@ impl Pupil for Pusher {
     fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64> {
         let Some(val) = &self.val else { return Ok(0.0) };
         let update = self.trainer.with(Cnabu::load_file(&self.weights)?);
-        let tallies = evaluate_pushes(val, &self.observe, &update, &mut |_| ())?;
+        let tallies = evaluate_pushes(val, self.priors.network(), &update, &mut |_| ())?;
         let (before, after) = (tallies.unchanged.scores(), tallies.predicted.scores());
         eprintln!(
             "sigma_m   on changed cells: occupied IoU {:.3} ({:.3} as if unchanged), mIoU {:.3} ({:.3}), mECE {:.3} ({:.3})",

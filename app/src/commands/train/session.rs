@@ -4,8 +4,8 @@ use super::SessionArgs;
 use super::curve::Curve;
 use crate::commands::warn;
 use nudge_core::Error;
-use nudge_core::cnabu::{Device, set_threads};
-use nudge_core::learn::{Dataset, Sample, TrainSettings, checkpoint_path};
+use nudge_core::cnabu::{Device, Layout, Network, set_threads};
+use nudge_core::learn::{Dataset, Sample, TrainSettings, Trainer, checkpoint_path};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -22,16 +22,6 @@ pub(super) trait Pupil {
     fn updates(&self) -> u64;
     /// Scores the running mean of the weights; what is to fall.
     fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64>;
-}
-
-/// How a run begins.
-pub(super) enum Begin<'a> {
-    /// With fresh weights.
-    Fresh,
-    /// With the checkpoint of another run.
-    From(&'a Path),
-    /// Where it was stopped.
-    Resume,
 }
 
 impl SessionArgs {
@@ -54,16 +44,28 @@ impl SessionArgs {
         nudge_core::cnabu::device(&self.device)
     }
 
-    /// How the run begins; refuses to write over one that is there.
-    pub(super) fn begin(&self) -> nudge_core::Result<Begin<'_>> {
+    /// The network as the run begins or goes on: fresh, from its own checkpoint, that of another run, or finished weights.
+    /// Refuses to write over a run that is there.
+    pub(super) fn trainer<N: Network>(
+        &self,
+        settings: TrainSettings,
+        layout: Layout,
+        device: Device,
+    ) -> nudge_core::Result<Trainer<N>> {
         let there = checkpoint_path(&self.out);
         if self.resume {
-            return Ok(Begin::Resume);
+            return Trainer::resume(&self.out, settings, layout, device);
         }
         if there.exists() && !self.force {
             return Err(Error::input(there, "", "is there already; --resume goes on with it, --force replaces it"));
         }
-        Ok(self.from.as_deref().map_or(Begin::Fresh, Begin::From))
+        match self.from.as_deref() {
+            None => Trainer::new(settings, layout, device),
+            Some(weights) if weights.extension().is_some_and(|extension| extension == "safetensors") => {
+                Trainer::begin_with(weights, settings, layout, device)
+            }
+            Some(run) => Trainer::load(run, settings, layout, device),
+        }
     }
 
     /// The training data, and the validation data if there is some.
@@ -131,7 +133,8 @@ impl SessionArgs {
     }
 }
 
-fn open<S: Sample>(directory: &Path) -> nudge_core::Result<Dataset<S>> {
+/// Opens a data directory and names what it has to skip.
+pub(super) fn open<S: Sample>(directory: &Path) -> nudge_core::Result<Dataset<S>> {
     let data = Dataset::open(directory)?;
     data.skipped().iter().for_each(|skipped| warn(&format!("skipped: {skipped}")));
     Ok(data)

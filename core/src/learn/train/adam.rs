@@ -5,6 +5,8 @@ use tch::Tensor;
 const BETA_1: f64 = 0.9;
 const BETA_2: f64 = 0.999;
 const EPSILON: f64 = 1e-8;
+/// Steps over which the step size rises: the gradients' size is not known yet.
+const WARM_UP: f64 = 100.0;
 /// Gradients are scaled down to this norm when they are longer.
 const CLIP: f64 = 1.0;
 
@@ -13,18 +15,22 @@ const CLIP: f64 = 1.0;
 pub(super) struct Adam {
     pub(super) first: Vec<Tensor>,
     pub(super) second: Vec<Tensor>,
+    /// Steps that the moments are made of.
+    pub(super) steps: u64,
 }
 
 impl Adam {
     pub(super) fn new(variables: &[(String, Tensor)]) -> Self {
         let zeros = || variables.iter().map(|(_, variable)| variable.detach().zeros_like()).collect();
-        Self { first: zeros(), second: zeros() }
+        Self { first: zeros(), second: zeros(), steps: 0 }
     }
 
-    /// Update number `count` (from 1): moves the variables against their gradients and clears these.
-    pub(super) fn step(&mut self, variables: &[(String, Tensor)], learning_rate: f64, count: u64) {
-        let unbias = |beta: f64| 1.0 - beta.powf(count as f64);
-        let step = learning_rate / unbias(BETA_1);
+    /// Moves the variables against their gradients and clears these. The step size rises over the first steps.
+    pub(super) fn step(&mut self, variables: &[(String, Tensor)], learning_rate: f64) {
+        self.steps += 1;
+        let steps = self.steps as f64;
+        let unbias = |beta: f64| 1.0 - beta.powf(steps);
+        let step = learning_rate * (steps / WARM_UP).min(1.0) / unbias(BETA_1);
         let unbias_2 = unbias(BETA_2).sqrt();
         tch::no_grad(|| {
             let norms: Vec<Tensor> = variables.iter().map(|(_, variable)| variable.grad().norm()).collect();

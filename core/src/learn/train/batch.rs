@@ -26,11 +26,15 @@ impl<'a> Batch<'a> {
         count: usize,
         rng: &mut ChaCha8Rng,
     ) -> Result<Self> {
-        let drawn: Vec<(usize, Mirror)> = (0..count)
-            .map(|_| (rng.random_range(0..data.len()), if rng.random() { Mirror::X } else { Mirror::No }))
-            .collect();
+        let drawn: Vec<(usize, Mirror)> =
+            (0..count).map(|_| (rng.random_range(0..data.len()), Mirror::either(rng))).collect();
         let samples = drawn.into_par_iter().map(|(at, mirror)| Ok((data.get(at)?, mirror)));
-        Ok(Self { layout, samples: samples.collect::<Result<_>>()? })
+        Ok(Self::of(layout, samples.collect::<Result<_>>()?))
+    }
+
+    /// These samples.
+    pub(super) fn of(layout: &'a Layout, samples: Vec<(MapSample, Mirror)>) -> Self {
+        Self { layout, samples }
     }
 
     /// `[B, channels, X, Y]`, filled sample by sample.

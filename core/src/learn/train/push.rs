@@ -1,32 +1,27 @@
 //! Training sigma_m: the frozen sigma_o over a sample's views gives the belief, then each of its pushes is to be predicted.
 //!
-//! The loss is that of occupancy and semantics after the push, mostly of the cells that it changes, plus that of the change mask (does anything of a floor cell
-//! change, voxels or label), plus a small consistency term: where nothing changes the evidence is to stay as it was
-//! (squared difference of the logarithms).
+//! The loss is that of occupancy and semantics after the push, mostly of the cells that it changes, plus that of the change
+//! mask (does anything of a floor cell change, voxels or label), plus a small consistency term: where nothing changes the
+//! evidence is to stay as it was (squared difference of the logarithms).
 
-use super::TrainSettings;
-use super::state::{self, State};
+use super::Trainer;
+use super::kept::Kept;
+use crate::Result;
 use crate::belief::{Carried, FloorPlan, SOLID};
 use crate::cnabu::{
-    Card, Cnabu, Evidence, Layout, LossForm, Mirror, Numbers, PushConfig, PushNet, PushPlanes, Pushed, WINDOW,
-    Windowed, belief_of, observation_planes, occupancy_loss, push_planes, semantics_loss, windows,
+    Cnabu, Evidence, Layout, LossForm, Mirror, Numbers, PriorParts, PushNet, PushPlanes, Pushed, WINDOW, Windowed,
+    belief_of, observation_planes, occupancy_loss, push_planes, semantics_loss, windows,
 };
 use crate::learn::{Dataset, PushSample, PushedSample};
 use crate::rng::stream;
 use crate::scene::CLASS_COUNT;
-use crate::{Error, Result};
 use rand::Rng;
-use std::collections::HashMap;
 use std::ops::Range;
-use std::path::Path;
 use std::sync::Arc;
-use tch::nn::VarStore;
-use tch::{Device, Kind, Tensor};
+use tch::{Kind, Tensor};
 
 /// Sub-cells of a pixel.
 const SUBS: usize = 4;
-/// Memory for beliefs that are kept, bytes.
-const BELIEFS_BYTES: usize = 6 << 30;
 /// How much a floor cell that does not change counts beside one that does. Next to nothing: the posterior is gated with the
 /// probability of change, so what is wanted is the prediction given that the cell changes. (With 0.1 about half of
 /// the loss was of unchanged cells: the prediction was hedged towards them, and the gate hedged it once more.)
@@ -46,94 +41,12 @@ pub struct PushLoss {
 }
 
 /// A sigma_m in training. Its settings' `max_views` does not matter: a sample has the views that it has.
-#[derive(Debug)]
-pub struct PushTrainer {
-    settings: TrainSettings,
-    layout: Layout,
-    net: PushNet,
-    store: VarStore,
-    state: State,
-    /// What sigma_o makes of the samples seen so far.
-    beliefs: Beliefs,
-}
+pub type PushTrainer = Trainer<PushNet>;
 
 impl PushTrainer {
-    /// A network with fresh weights, for samples over the grid of `layout`.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for settings out of range.
-    pub fn new(settings: TrainSettings, layout: Layout, device: Device) -> Result<Self> {
-        settings.check()?;
-        if layout.is_padded() {
-            return Err(Error::Usage("training wants a floor plan of a multiple of 16 cells along x and y".to_owned()));
-        }
-        tch::manual_seed(settings.seed as i64);
-        let store = VarStore::new(device);
-        let net = PushNet::new(&store.root(), PushConfig { width: settings.width });
-        let state = State::new(&store);
-        Ok(Self { settings, layout, net, store, state, beliefs: Beliefs::default() })
-    }
-
-    /// Goes on with the run named `out`.
-    ///
-    /// # Errors
-    /// For a run with other settings (names the first that differs), and a checkpoint that is missing or damaged.
-    pub fn resume(out: &Path, settings: TrainSettings, layout: Layout, device: Device) -> Result<Self> {
-        state::same_settings(out, &settings)?;
-        Self::load(out, settings, layout, device)
-    }
-
-    /// Begins with the checkpoint of the run named `out`, whatever its settings were.
-    ///
-    /// # Errors
-    /// For a checkpoint that is missing, damaged, or of another network.
-    pub fn load(out: &Path, settings: TrainSettings, layout: Layout, device: Device) -> Result<Self> {
-        let mut trainer = Self::new(settings, layout, device)?;
-        trainer.state.load(out)?;
-        Ok(trainer)
-    }
-
-    /// The settings of the run named `out`.
-    ///
-    /// # Errors
-    /// When they cannot be read.
-    pub fn logged_settings(out: &Path) -> Result<TrainSettings> {
-        state::logged_settings(out)
-    }
-
-    /// Writes a checkpoint of the run named `out`, whole or not at all.
-    ///
-    /// # Errors
-    /// When it cannot be written.
-    pub fn save(&self, out: &Path) -> Result<()> {
-        self.state.save(out, &self.settings)
-    }
-
-    /// Updates of the weights so far.
-    pub fn updates(&self) -> u64 {
-        self.state.updates
-    }
-
-    /// Number of parameters.
-    pub fn parameters(&self) -> i64 {
-        self.state.parameters()
-    }
-
-    /// The running mean of the weights by name.
-    pub fn mean_weights(&self) -> Vec<(String, Tensor)> {
-        self.state.mean_weights()
-    }
-
-    /// A card for the weights.
-    pub fn card(&self) -> Card {
-        Card::new("sigma_m", self.settings.width, self.parameters())
-    }
-
     /// `observe` with the running mean of the weights as its sigma_m.
     pub fn with(&self, observe: Cnabu) -> Cnabu {
-        let store = VarStore::new(self.store.device());
-        let net = PushNet::new(&store.root(), PushConfig { width: self.settings.width });
-        self.state.copy_mean(&store);
+        let (net, store) = self.mean_net();
         observe.with_push(net, store)
     }
 
@@ -141,25 +54,21 @@ impl PushTrainer {
     ///
     /// # Errors
     /// When a sample cannot be read, and [`Error::Check`] when the loss is no longer finite.
-    pub fn train(&mut self, data: &Dataset<PushSample>, observe: &Cnabu, rate: f64) -> Result<PushLoss> {
+    pub fn train(&mut self, data: &Dataset<PushSample>, priors: &mut Priors, rate: f64) -> Result<PushLoss> {
         let mut rng = stream(self.settings.seed, "push training batch", self.state.batches);
         let mut scenes = Vec::new();
         while scenes.len() < self.settings.batch {
-            let (at, mirrored) = (rng.random_range(0..data.len()), rng.random());
+            let (at, mirror) = (rng.random_range(0..data.len()), Mirror::either(&mut rng));
             let sample = data.get(at)?;
             if !sample.pushes.is_empty() {
-                let mirror = if mirrored { Mirror::X } else { Mirror::No };
-                scenes.push(Scene::new(
-                    &self.layout,
-                    &sample,
-                    mirror,
-                    &self.beliefs.of(&self.layout, at, &sample, observe),
-                ));
+                scenes.push(Scene::new(&self.layout, &sample, mirror, &priors.of(&self.layout, at, &sample)));
             }
         }
         let device = self.store.device();
         let stacked = |part: &dyn Fn(&Scene) -> Tensor| Tensor::cat(&scenes.iter().map(part).collect::<Vec<_>>(), 0);
-        let stem = stacked(&|scene| windows(&self.net.prior_stem(&scene.evidence), &scene.xs));
+        let parts: Vec<PriorParts> =
+            scenes.iter().map(|scene| self.net.prior_parts(&scene.evidence).windows(&scene.xs)).collect();
+        let parts = PriorParts::stacked(&parts);
         let prior = Evidence {
             occupancy: stacked(&|scene| windows(&scene.evidence.occupancy, &scene.xs)),
             semantics: stacked(&|scene| windows(&scene.evidence.semantics, &scene.xs)),
@@ -176,28 +85,15 @@ impl PushTrainer {
         let (truth, classes) = (put(&|s| s.truth.shallow_clone()), put(&|s| s.classes.shallow_clone()));
         let changed = put(&|s| s.changed.shallow_clone());
 
-        let pushed = self.net.forward(&stem, &prior, &pushes);
-        let ramp = (self.state.updates as f64 / self.settings.kl_ramp.max(1) as f64).min(1.0);
-        let (loss, parts) = self.loss(&pushed, &prior, &Targets { truth, classes, changed }, ramp, &mut rng);
-        if ![parts.occupancy, parts.semantics, parts.change].iter().all(|part| part.is_finite()) {
-            let message = format!("training diverged: the loss of update {} is not finite", self.state.updates);
-            return Err(Error::Check(message));
-        }
-        loss.backward();
-        self.state.update(self.settings.learning_rate * rate, self.settings.mean_decay);
+        let pushed = self.net.forward(&parts, &prior, &pushes);
+        let (loss, parts) = self.loss(&pushed, &prior, &Targets { truth, classes, changed }, &mut rng);
+        self.descend(&loss, &[parts.occupancy, parts.semantics, parts.change], rate)?;
         self.state.batches += 1;
         Ok(parts)
     }
 
-    fn loss(
-        &self,
-        pushed: &Pushed,
-        prior: &Evidence,
-        to: &Targets,
-        ramp: f64,
-        rng: &mut impl Rng,
-    ) -> (Tensor, PushLoss) {
-        let kl = self.settings.kl_weight * ramp;
+    fn loss(&self, pushed: &Pushed, prior: &Evidence, to: &Targets, rng: &mut impl Rng) -> (Tensor, PushLoss) {
+        let kl = self.kl();
         let at = [rng.random_range(0..2), rng.random_range(0..2)];
         let quarter = |t: &Tensor| t.slice(2, at[0], None, 2).slice(3, at[1], None, 2);
         let levels = pushed.occupancy.size()[1] / 2;
@@ -264,28 +160,29 @@ impl Prior {
     }
 }
 
-/// The priors of the samples seen so far: as long as training lasts they stay the same, and take most of an update's time.
-/// Kept up to [`BELIEFS_BYTES`]; what does not fit is made again.
-#[derive(Debug, Default)]
-struct Beliefs {
-    kept: HashMap<usize, Prior>,
-    bytes: usize,
+/// The frozen sigma_o and what it makes of the samples seen so far: as long as training lasts that stays the same, and takes
+/// most of an update's time.
+#[derive(Debug)]
+pub struct Priors {
+    observe: Cnabu,
+    kept: Kept<Prior>,
 }
 
-impl Beliefs {
+impl Priors {
+    /// Those of a sigma_o, of samples of one data directory.
+    pub fn of_network(observe: Cnabu) -> Self {
+        Self { observe, kept: Kept::default() }
+    }
+
+    /// The sigma_o.
+    pub fn network(&self) -> &Cnabu {
+        &self.observe
+    }
+
     /// The prior of sample `number`, not mirrored.
-    fn of(&mut self, layout: &Layout, number: usize, sample: &PushSample, observe: &Cnabu) -> Prior {
-        if let Some(kept) = self.kept.get(&number) {
-            return kept.single();
-        }
-        let prior = Prior::of(layout, sample, observe);
-        let single = prior.single();
-        let bytes = 2 * (prior.evidence.occupancy.numel() + prior.evidence.semantics.numel());
-        if self.bytes + bytes <= BELIEFS_BYTES {
-            self.bytes += bytes;
-            self.kept.insert(number, prior);
-        }
-        single
+    fn of(&mut self, layout: &Layout, number: usize, sample: &PushSample) -> Prior {
+        let observe = &self.observe;
+        self.kept.of(number, || Prior::of(layout, sample, observe), |prior| prior.evidence.bytes()).single()
     }
 }
 

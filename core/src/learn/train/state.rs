@@ -27,10 +27,8 @@ fn with_suffix(out: &Path, suffix: &str) -> PathBuf {
     out.with_file_name(format!("{name}{suffix}"))
 }
 
-/// Counters: updates, batches.
+/// Counters: updates, batches, Adam's steps.
 const COUNTERS: &str = "counters";
-/// Updates over which the step size rises: Adam does not know the gradients' size yet.
-const WARM_UP: f64 = 100.0;
 
 /// Weights, their running mean, Adam's moments and counters.
 #[derive(Debug)]
@@ -63,8 +61,7 @@ impl State {
     /// Moves the weights against their gradients, and the running mean after them; `mean_decay` is the old mean's share.
     pub(super) fn update(&mut self, learning_rate: f64, mean_decay: f64) {
         self.updates += 1;
-        let warm_up = (self.updates as f64 / WARM_UP).min(1.0);
-        self.adam.step(&self.variables, learning_rate * warm_up, self.updates);
+        self.adam.step(&self.variables, learning_rate);
         let young = (1.0 + self.updates as f64) / (10.0 + self.updates as f64);
         let follow = 1.0 - mean_decay.min(young);
         tch::no_grad(|| {
@@ -93,7 +90,7 @@ impl State {
     pub(super) fn save(&self, out: &Path, settings: &impl Serialize) -> Result<()> {
         let path = settings_path(out);
         let text = toml::to_string(settings).map_err(|error| Error::input(&path, "", error.to_string()))?;
-        let counters = Tensor::from_slice(&[self.updates as i64, self.batches as i64]);
+        let counters = Tensor::from_slice(&[self.updates, self.batches, self.adam.steps].map(|count| count as i64));
         let mut tensors = vec![(COUNTERS.to_owned(), counters)];
         let states = self.mean.iter().zip(self.adam.first.iter().zip(&self.adam.second));
         for ((name, variable), (mean, (first, second))) in self.variables.iter().zip(states) {
@@ -116,11 +113,23 @@ impl State {
             take(&tensors, "first", name, first, &path)?;
             take(&tensors, "second", name, second, &path)?;
         }
-        let counters = tensors.get(COUNTERS).filter(|t| t.size() == [2] && t.kind() == Kind::Int64);
+        let counters = tensors.get(COUNTERS).filter(|t| t.size() == [3] && t.kind() == Kind::Int64);
         let counters = counters.ok_or_else(|| Error::input(&path, COUNTERS, "are missing"))?;
-        self.updates = counters.int64_value(&[0]).max(0) as u64;
-        self.batches = counters.int64_value(&[1]).max(0) as u64;
+        let counter = |at: i64| counters.int64_value(&[at]).max(0) as u64;
+        (self.updates, self.batches, self.adam.steps) = (counter(0), counter(1), counter(2));
         Ok(())
+    }
+
+    /// Takes over weights, those in `store`, that have behind them as many updates as their card says. Adam begins anew.
+    pub(super) fn begin_with(&mut self, store: &VarStore, updates: u64) {
+        let variables: BTreeMap<String, Tensor> = store.variables().into_iter().collect();
+        tch::no_grad(|| {
+            for ((mean, (_, variable)), weights) in self.mean.iter_mut().zip(&self.variables).zip(variables.values()) {
+                mean.copy_(weights);
+                variable.shallow_clone().copy_(weights);
+            }
+        });
+        self.updates = updates;
     }
 }
 

@@ -1,7 +1,8 @@
 use super::*;
 use crate::belief::Classical;
 use crate::camera::ViewArray;
-use crate::learn::{Card as DataCard, Job, Kind as DataKind, Recipe, evaluate, make};
+use crate::cnabu::Cnabu;
+use crate::learn::{Card as DataCard, Dataset, Job, Kind as DataKind, MapSample, PushSample, Recipe, evaluate, make};
 use crate::scene::{Catalog, GenerateConfig};
 use std::path::Path;
 
@@ -25,16 +26,25 @@ fn data(count: usize) -> (tempfile::TempDir, Dataset<MapSample>) {
     (directory, data)
 }
 
+/// Makes `count` push samples in a temporary directory.
+fn pushes(count: usize) -> (tempfile::TempDir, Dataset<PushSample>) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let card = DataCard::new(DataKind::Pushes, &recipe(), 6, count);
+    make::<PushSample>(&card, &recipe(), directory.path(), Job::default(), &|_| ()).expect("made");
+    let data = Dataset::open(directory.path()).expect("opened");
+    (directory, data)
+}
+
 fn small() -> TrainSettings {
     TrainSettings { width: 8, batch: 2, max_views: 3, ..TrainSettings::default() }
 }
 
-fn trainer(settings: TrainSettings, data: &Dataset<MapSample>) -> Trainer {
-    Trainer::new(settings, Layout::new(&data.grid()).expect("5 mm"), Device::Cpu).expect("settings in range")
+fn trainer(settings: TrainSettings, data: &Dataset<MapSample>) -> ObserveTrainer {
+    ObserveTrainer::new(settings, Layout::new(&data.grid()).expect("5 mm"), Device::Cpu).expect("settings in range")
 }
 
-fn run(trainer: &mut Trainer, data: &Dataset<MapSample>, batches: usize) -> Vec<ViewLoss> {
-    (0..batches).flat_map(|_| trainer.train(data, 1.0).expect("trained")).collect()
+fn run(trainer: &mut ObserveTrainer, data: &Dataset<MapSample>, batches: usize) -> Vec<ViewLoss> {
+    (0..batches).flat_map(|_| trainer.train(data, None, 1.0).expect("trained")).collect()
 }
 
 #[test]
@@ -45,7 +55,7 @@ fn a_resumed_run_is_the_run_that_was_not_stopped() {
     run(&mut whole, &data, 3);
     whole.save(&out).expect("saved");
     let mut resumed =
-        Trainer::resume(&out, small(), Layout::new(&data.grid()).expect("5 mm"), Device::Cpu).expect("resumed");
+        ObserveTrainer::resume(&out, small(), Layout::new(&data.grid()).expect("5 mm"), Device::Cpu).expect("resumed");
     assert_eq!((resumed.updates(), resumed.batches()), (whole.updates(), whole.batches()));
     assert_eq!(run(&mut resumed, &data, 3), run(&mut whole, &data, 3));
     for ((name, a), (_, b)) in resumed.state.variables.iter().zip(&whole.state.variables) {
@@ -60,12 +70,12 @@ fn a_run_with_other_settings_or_a_damaged_checkpoint_is_refused() {
     let layout = Layout::new(&data.grid()).expect("5 mm");
     trainer(small(), &data).save(&out).expect("saved");
     let other = TrainSettings { learning_rate: 5e-4, ..small() };
-    let error = Trainer::resume(&out, other, layout, Device::Cpu).expect_err("refused").to_string();
+    let error = ObserveTrainer::resume(&out, other, layout, Device::Cpu).expect_err("refused").to_string();
     assert!(error.contains("run.toml: learning_rate: is 0.001 in this run, not 0.0005"), "{error}");
     let path = checkpoint_path(&out);
     let whole = std::fs::read(&path).expect("read");
     std::fs::write(&path, &whole[..whole.len() / 2]).expect("written");
-    let error = Trainer::resume(&out, small(), layout, Device::Cpu).expect_err("refused").to_string();
+    let error = ObserveTrainer::resume(&out, small(), layout, Device::Cpu).expect_err("refused").to_string();
     assert!(error.contains("run.safetensors") && error.contains("damaged") && !error.contains('\n'), "{error}");
 }
 
@@ -93,6 +103,66 @@ fn one_and_two_threads_give_losses_within_tolerance() {
     for (one, two) in one.iter().zip(&two) {
         assert!((one.occupancy - two.occupancy).abs() < 1e-3 && (one.semantics - two.semantics).abs() < 5e-3);
     }
+}
+
+#[test]
+fn sequences_that_begin_after_a_push_are_as_many_as_asked_for_and_resume_exactly() {
+    let ((directory, data), (push_directory, _)) = (data(2), pushes(2));
+    let layout = Layout::new(&data.grid()).expect("5 mm");
+    let sigma_o = trainer(small(), &data);
+    let sigma_m = PushTrainer::new(small(), layout, Device::Cpu).expect("settings in range");
+    let after =
+        || AfterPushes::new(Dataset::open(push_directory.path()).expect("opened"), sigma_m.with(sigma_o.update()));
+    let settings = TrainSettings { push_share: 0.5, ..small() };
+    let mut whole = trainer(settings.clone(), &data);
+    let mut first = after();
+    let train = |trainer: &mut ObserveTrainer, after: &mut AfterPushes| {
+        trainer.train(&data, Some(after), 1.0).expect("trained")
+    };
+    let began: Vec<bool> = (0..16).map(|_| train(&mut whole, &mut first)[0].after_push).collect();
+    let share = began.iter().filter(|after_push| **after_push).count();
+    assert!((4..=12).contains(&share), "{share} of 16");
+
+    let out = directory.path().join("run");
+    whole.save(&out).expect("saved");
+    let mut resumed = ObserveTrainer::resume(&out, settings, layout, Device::Cpu).expect("resumed");
+    let mut again = after();
+    for _ in 0..4 {
+        assert_eq!(train(&mut resumed, &mut again), train(&mut whole, &mut first));
+    }
+    let mut none = trainer(TrainSettings { push_share: 0.0, ..small() }, &data);
+    assert!((0..4).all(|_| !train(&mut none, &mut first)[0].after_push));
+}
+
+#[test]
+fn a_run_begins_with_finished_weights() {
+    let (directory, data) = data(2);
+    let layout = Layout::new(&data.grid()).expect("5 mm");
+    let mut first = trainer(small(), &data);
+    run(&mut first, &data, 2);
+    let weights = directory.path().join("sigma_o.safetensors");
+    let mut card = first.card();
+    card.training.insert(crate::cnabu::UPDATES.into(), first.updates().to_string());
+    crate::cnabu::write_tensors(&weights, &first.mean_weights()).expect("written");
+    card.write(&weights).expect("written");
+
+    let mut second = ObserveTrainer::begin_with(&weights, small(), layout, Device::Cpu).expect("begun");
+    assert_eq!((second.updates(), second.batches()), (first.updates(), 0), "its updates count on");
+    for ((name, variable), (_, mean)) in second.state.variables.iter().zip(first.mean_weights()) {
+        assert!(variable.equal(&mean), "{name}");
+    }
+    // It is stopped and resumed as any other.
+    let out = directory.path().join("run");
+    run(&mut second, &data, 2);
+    second.save(&out).expect("saved");
+    let mut resumed = ObserveTrainer::resume(&out, small(), layout, Device::Cpu).expect("resumed");
+    assert_eq!(run(&mut resumed, &data, 2), run(&mut second, &data, 2));
+
+    let wider = TrainSettings { width: 16, ..small() };
+    let error = ObserveTrainer::begin_with(&weights, wider, layout, Device::Cpu).expect_err("refused").to_string();
+    assert!(error.contains("sigma_o.safetensors: width: is 8, not 16"), "{error}");
+    let error = PushTrainer::begin_with(&weights, small(), layout, Device::Cpu).expect_err("refused").to_string();
+    assert!(error.contains("network: is sigma_o; this program needs sigma_m"), "{error}");
 }
 
 #[test]
@@ -179,24 +249,21 @@ fn weights_go_to_a_file_and_come_back_and_bad_ones_are_told() {
 #[test]
 fn sigma_m_learns_what_a_push_does_and_predicts_inside_its_window() {
     use crate::belief::{Belief, BeliefUpdate};
-    use crate::learn::PushSample;
-    let directory = tempfile::tempdir().expect("a temporary directory");
-    let card = DataCard::new(DataKind::Pushes, &recipe(), 6, 2);
-    make::<PushSample>(&card, &recipe(), directory.path(), Job::default(), &|_| ()).expect("made");
-    let data = Dataset::<PushSample>::open(directory.path()).expect("opened");
+    let (directory, data) = pushes(2);
     let layout = Layout::new(&data.grid()).expect("5 mm");
-    let observe = Trainer::new(small(), layout, Device::Cpu).expect("settings in range").update();
+    let observer = ObserveTrainer::new(small(), layout, Device::Cpu).expect("settings in range");
+    let (observe, mut priors) = (observer.update(), Priors::of_network(observer.update()));
     let settings = TrainSettings { learning_rate: 3e-3, ..small() };
     let mut trainer = PushTrainer::new(settings.clone(), layout, Device::Cpu).expect("settings in range");
     let total = |loss: PushLoss| loss.occupancy + loss.semantics + loss.change;
-    let losses: Vec<f64> = (0..60).map(|_| total(trainer.train(&data, &observe, 1.0).expect("trained"))).collect();
+    let losses: Vec<f64> = (0..60).map(|_| total(trainer.train(&data, &mut priors, 1.0).expect("trained"))).collect();
     let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
     assert!(mean(&losses[50..]) < 0.7 * mean(&losses[..5]), "{losses:?}");
 
     let out = directory.path().join("run");
     trainer.save(&out).expect("saved");
     let mut resumed = PushTrainer::resume(&out, settings, layout, Device::Cpu).expect("resumed");
-    let next = |trainer: &mut PushTrainer| trainer.train(&data, &observe, 1.0).expect("trained");
+    let mut next = |trainer: &mut PushTrainer| trainer.train(&data, &mut priors, 1.0).expect("trained");
     assert_eq!(next(&mut resumed), next(&mut trainer));
 
     let sample = data.get(0).expect("read");
@@ -224,22 +291,4 @@ fn sigma_m_learns_what_a_push_does_and_predicts_inside_its_window() {
             assert!(same || prediction.change[at] > 0.0);
         }
     }
-}
-
-#[test]
-fn sequences_show_every_view_before_any_comes_again() {
-    let mut rng = crate::rng::stream(1, "sequences", 0);
-    let mut longest = 0;
-    let mut firsts = std::collections::BTreeSet::new();
-    for _ in 0..400 {
-        let views = super::sequence(20, &mut rng);
-        longest = longest.max(views.len());
-        assert!((1..=20).contains(&views.len()));
-        let mut first: Vec<usize> = views.iter().copied().take(VIEWS).collect();
-        firsts.insert(first[0]);
-        first.sort_unstable();
-        first.dedup();
-        assert_eq!(first.len(), views.len().min(VIEWS), "{views:?}");
-    }
-    assert_eq!((longest, firsts.len()), (20, VIEWS), "all lengths, in all orders");
 }

@@ -64,7 +64,7 @@ train-push: cnabu
 	$(NUDGE) data pushes --count 6000 --seed 1 --out $(DATA)/pushes/train
 	$(NUDGE) train push --data $(DATA)/pushes/train --val $(DATA)/pushes/val --out $(DATA)/sigma_m \
 		$$([ -e $(DATA)/sigma_m.safetensors ] && echo --resume) --patience 8
-	$(NUDGE) train export push $(DATA)/sigma_m --data $(DATA)/pushes/train --test $(DATA)/pushes/test --out models
+	$(NUDGE) train export push $(DATA)/sigma_m --data $(DATA)/pushes/train --val $(DATA)/pushes/val --test $(DATA)/pushes/test --out models
 
 test-cnabu: cnabu python
 	LIBTORCH="$$(scripts/libtorch.sh)" cargo test --release --locked $(NETWORKS) -- --include-ignored cnabu train

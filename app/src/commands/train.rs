@@ -145,12 +145,15 @@ pub(super) enum Network {
 pub(super) struct ExportArgs {
     /// Which network it is
     network: Network,
-    /// Name of the run
+    /// Name of the run; for sigma_m also finished weights (FILE.safetensors), to calibrate and score them anew
     run: PathBuf,
     /// Held-out data that the card's scores are of
     #[arg(long, value_name = "DIR")]
     test: PathBuf,
-    /// Scenes of it to use
+    /// Validation data of pushes: fits the temperature of sigma_m's probabilities of change
+    #[arg(long, value_name = "DIR")]
+    val: Option<PathBuf>,
+    /// Scenes of the held-out data to use
     #[arg(long, default_value_t = 300)]
     scenes: usize,
     /// The training data, for the card

@@ -71,9 +71,11 @@ pub(crate) fn push_planes(layout: &Layout, prior: &Numbers, pushes: &[Windowed<'
     }
 }
 
-/// The predictions of a network for pushes from one belief, whose evidence is `prior`.
+/// The predictions of a network for pushes from one belief, whose evidence is `prior`; its log-odds of change are divided
+/// by `temperature`.
 pub(super) fn predict(
     net: &PushNet,
+    temperature: f32,
     layout: &Layout,
     prior: &Evidence,
     belief: &Belief,
@@ -97,7 +99,7 @@ pub(super) fn predict(
         let z = values(&body.change);
         let (z, each) = (&z[..], z.len() / xs.len());
         let changing: Vec<Changing> =
-            z.par_chunks(each).zip(&xs).map(|(z, x)| Changing::new(z, layout, x.clone())).collect();
+            z.par_chunks(each).zip(&xs).map(|(z, x)| Changing::new(z, temperature, layout, x.clone())).collect();
         let heads = Heads::of(net, prior, &body, &planes, &changing, layout, device);
         let mut next = 0;
         let firsts = changing.iter().map(|changing| {
@@ -124,12 +126,12 @@ struct Changing<'a> {
 
 impl<'a> Changing<'a> {
     /// From the change planes of one window, for and against.
-    fn new(z: &[f32], layout: &'a Layout, x: Range<usize>) -> Self {
+    fn new(z: &[f32], temperature: f32, layout: &'a Layout, x: Range<usize>) -> Self {
         let plane = z.len() / (2 * SUBS);
         let (yes, no) = z.split_at(SUBS * plane);
         let chance = |(&yes, &no): (&f32, &f32)| {
             let [yes, no] = evidence([yes, no]);
-            let p = yes / (yes + no);
+            let p = 1.0 / (1.0 + (no / yes).powf(1.0 / temperature));
             if p < CHANGE_FLOOR { 0.0 } else { p }
         };
         let chance: Vec<f32> = yes.iter().zip(no).map(chance).collect();

@@ -29,7 +29,8 @@ pub struct Cnabu {
 #[derive(Debug)]
 struct Networks {
     observe: ObserveNet,
-    push: Option<PushNet>,
+    /// sigma_m, and the temperature of its probabilities of change.
+    push: Option<(PushNet, f32)>,
     /// They hold the variables, and say on which device.
     stores: Vec<VarStore>,
 }
@@ -69,8 +70,8 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn with_push_file(self, path: &Path) -> Result<Self> {
-        let (net, store, _) = load_network::<PushNet>(path, self.device())?;
-        Ok(self.with_push(net, store))
+        let (net, store, card) = load_network::<PushNet>(path, self.device())?;
+        Ok(self.with_push(net, store, card.change_temperature.unwrap_or(1.0)))
     }
 
     /// A belief update of a sigma_o at hand.
@@ -78,11 +79,11 @@ impl Cnabu {
         Self { networks: Mutex::new(Networks { observe: net, push: None, stores: vec![store] }), card }
     }
 
-    /// The same with a sigma_m at hand.
-    pub fn with_push(self, net: PushNet, store: VarStore) -> Self {
+    /// The same with a sigma_m at hand, whose log-odds of change are divided by `temperature`.
+    pub fn with_push(self, net: PushNet, store: VarStore, temperature: f32) -> Self {
         {
             let mut networks = self.networks();
-            networks.push = Some(net);
+            networks.push = Some((net, temperature));
             networks.stores.push(store);
         }
         self
@@ -167,7 +168,9 @@ impl BeliefUpdate for Cnabu {
         let prior = self.planes_of(&layout, belief);
         let networks = self.networks();
         match &networks.push {
-            Some(net) => tch::no_grad(|| predict(net, &layout, &prior, belief, pushes, networks.device())),
+            Some((net, temperature)) => {
+                tch::no_grad(|| predict(net, *temperature, &layout, &prior, belief, pushes, networks.device()))
+            }
             None => Classical.predict_pushes(belief, pushes),
         }
     }

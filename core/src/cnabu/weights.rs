@@ -44,6 +44,10 @@ pub struct Card {
     /// The settings of the training run and how far it went.
     #[serde(default)]
     pub training: BTreeMap<String, String>,
+    /// Of sigma_m: what the log-odds of its probabilities of change are divided by (temperature scaling, Guo et al. 2017),
+    /// fitted on validation pushes; 1 if it is not there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub change_temperature: Option<f32>,
     /// Of sigma_m: scores on the floor cells that held-out pushes change, beside those of other predictions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub pushes: BTreeMap<String, f64>,
@@ -66,6 +70,7 @@ impl Card {
             parameters,
             data: BTreeMap::new(),
             training: BTreeMap::new(),
+            change_temperature: None,
             pushes: BTreeMap::new(),
             scores: Vec::new(),
         }
@@ -100,6 +105,9 @@ impl Card {
                 "width",
                 format!("is {}; a multiple of 8 up to 512 is needed", card.width),
             ));
+        }
+        if card.change_temperature.is_some_and(|t| !(0.1..=10.0).contains(&t)) {
+            return Err(Error::input(&path, "change_temperature", "0.1 to 10 is needed"));
         }
         Ok(card)
     }

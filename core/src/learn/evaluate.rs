@@ -75,6 +75,59 @@ pub fn evaluate_pushes(
     Ok(tallies)
 }
 
+/// What the log-odds of the predicted probabilities of change have to be divided by so that they fit best to what happened
+/// (least negative log-likelihood; temperature scaling, Guo et al., "On calibration of modern neural networks", 2017), over
+/// all floor cells that a prediction holds possible to change.
+///
+/// # Errors
+/// When a sample cannot be read.
+pub fn fit_change_temperature(data: &Dataset<PushSample>, update: &dyn BeliefUpdate) -> Result<f64> {
+    let grid = data.grid();
+    let mut outcomes = Vec::new();
+    for at in 0..data.len() {
+        let sample = data.get(at)?;
+        let look = |belief: Belief, view: &ViewSample| update.observe(&belief, &view.observation);
+        let belief = sample.views.iter().fold(Belief::uniform(grid), look);
+        let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
+        for (pushed, prediction) in sample.pushes.iter().zip(update.predict_pushes(&belief, &pushes)) {
+            let changed = sample.changed_by(pushed);
+            let cells = prediction.window.cells(&grid).zip(&prediction.change).filter(|(_, p)| **p > 0.0);
+            outcomes.extend(cells.map(|(cell, p)| (log_odds(f64::from(*p)), changed[cell])));
+        }
+    }
+    Ok(best_temperature(&outcomes))
+}
+
+fn log_odds(p: f64) -> f64 {
+    let p = p.clamp(1e-6, 1.0 - 1e-6);
+    (p / (1.0 - p)).ln()
+}
+
+/// The temperature between 0.2 and 5 under which log-odds fit best to whether something happened.
+fn best_temperature(outcomes: &[(f64, bool)]) -> f64 {
+    // -ln P(outcome) = ln(1 + e^-z) where it happened, ln(1 + e^z) where it did not.
+    let loss = |log_t: f64| -> f64 {
+        let scale = (-log_t).exp();
+        outcomes
+            .iter()
+            .map(|(z, happened)| if *happened { -z * scale } else { z * scale })
+            .map(|z| z.exp().ln_1p())
+            .sum()
+    };
+    // In 1 / T the loss is convex, so over ln T it has one minimum: golden-section search.
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut low, mut high) = (0.2_f64.ln(), 5.0_f64.ln());
+    while high - low > 1e-3 {
+        let (left, right) = (high - golden * (high - low), low + golden * (high - low));
+        if loss(left) < loss(right) {
+            high = right;
+        } else {
+            low = left;
+        }
+    }
+    (0.5 * (low + high)).exp()
+}
+
 /// Counts on the whole map after the first push of every sample: entry `v` is of the belief that was predicted, updated with
 /// `v` views of what the push left.
 ///
@@ -113,4 +166,23 @@ fn truth_map(grid: &Grid, occupied: &VoxelSet, labels: &[u8]) -> TruthMap {
     let mut occupancy = vec![0; grid.voxel_count()];
     occupied.iter().for_each(|voxel| occupancy[voxel] = 1);
     TruthMap { dims: grid.dims, occupancy, labels: labels.to_vec(), objects: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{best_temperature, log_odds};
+
+    #[test]
+    fn a_temperature_that_is_known_is_found() {
+        for temperature in [0.6, 1.0, 1.7] {
+            // Of 1,000 cells told at log-odds z, as many change as T says.
+            let cells = (-30..=30).map(|z| 0.1 * f64::from(z)).flat_map(|z: f64| {
+                let changed = (1000.0 / (1.0 + (-z / temperature).exp())).round() as usize;
+                (0..1000).map(move |number| (z, number < changed))
+            });
+            let found = best_temperature(&cells.collect::<Vec<_>>());
+            assert!((found - temperature).abs() < 0.02 * temperature, "{found} is not {temperature}");
+        }
+        assert!((log_odds(0.9) - 9.0_f64.ln()).abs() < 1e-9);
+    }
 }

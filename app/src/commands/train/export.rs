@@ -1,5 +1,6 @@
 //! `nudge train export`: a checkpoint becomes weights with a card.
 
+use super::session::is_weights;
 use super::{ExportArgs, Network};
 use crate::commands::{calibrate, print};
 use nudge_core::Error;
@@ -7,6 +8,7 @@ use nudge_core::belief::Classical;
 use nudge_core::cnabu::{Card, Cnabu, Layout, OBSERVE_WEIGHTS, PUSH_WEIGHTS, Tensor, UPDATES, half, write_tensors};
 use nudge_core::learn::{
     Dataset, MapSample, ObserveTrainer, PushSample, PushTrainer, Sample, TrainSettings, evaluate, evaluate_pushes,
+    fit_change_temperature,
 };
 use nudge_core::score::Scores;
 use serde::Serialize;
@@ -28,7 +30,8 @@ fn observe(args: &ExportArgs) -> anyhow::Result<()> {
     let trainer = ObserveTrainer::load(&args.run, settings.clone(), Layout::new(&test.grid())?, device)?;
     let path = args.out.join(OBSERVE_WEIGHTS);
     let mut card = trainer.card();
-    describe::<MapSample>(&mut card, args, &test, &settings, trainer.updates())?;
+    describe::<MapSample>(&mut card, args, &settings, trainer.updates())?;
+    card.data.insert("test".into(), command(&test));
     write(&path, &card, &trainer.mean_weights(), args.half)?;
     // What is scored is what was written, rounding included.
     card.scores = calibrate::scored(1, &evaluate(&test, &Cnabu::load_file(&path)?, &mut |_| ())?);
@@ -38,12 +41,27 @@ fn observe(args: &ExportArgs) -> anyhow::Result<()> {
 
 fn push(args: &ExportArgs) -> anyhow::Result<()> {
     let test = open::<PushSample>(&args.test, args.scenes)?;
-    let settings = PushTrainer::logged_settings(&args.run)?;
+    let layout = Layout::new(&test.grid())?;
     let device = nudge_core::cnabu::device("cpu")?;
-    let trainer = PushTrainer::load(&args.run, settings.clone(), Layout::new(&test.grid())?, device)?;
     let path = args.out.join(PUSH_WEIGHTS);
-    let mut card = trainer.card();
-    describe::<PushSample>(&mut card, args, &test, &settings, trainer.updates())?;
+    let (trainer, mut card) = if is_weights(&args.run) {
+        let card = Card::read(&args.run, "sigma_m")?;
+        let settings = TrainSettings { width: card.width, ..TrainSettings::default() };
+        (PushTrainer::begin_with(&args.run, settings, layout, device)?, card)
+    } else {
+        let settings = PushTrainer::logged_settings(&args.run)?;
+        let trainer = PushTrainer::load(&args.run, settings.clone(), layout, device)?;
+        let mut card = trainer.card();
+        describe::<PushSample>(&mut card, args, &settings, trainer.updates())?;
+        (trainer, card)
+    };
+    card.data.insert("test".into(), command(&test));
+    if let Some(val) = &args.val {
+        let val = open::<PushSample>(val, usize::MAX)?;
+        let untempered = trainer.with(Cnabu::load_file(&args.out.join(OBSERVE_WEIGHTS))?);
+        card.change_temperature = Some(fit_change_temperature(&val, &untempered)? as f32);
+        card.data.insert("val".into(), command(&val));
+    }
     write(&path, &card, &trainer.mean_weights(), args.half)?;
     let update = Cnabu::load(&args.out)?;
     let ours = evaluate_pushes(&test, &update, &update, &mut |_| ())?;
@@ -81,25 +99,25 @@ fn write(path: &Path, card: &Card, weights: &[(String, Tensor)], halved: bool) -
     card.write(path)
 }
 
-/// Tells the card how its weights came about, as commands that can be typed again.
+/// Tells the card how its weights came about, as a command that can be typed again, and settings.
 fn describe<S: Sample>(
     card: &mut Card,
     args: &ExportArgs,
-    test: &Dataset<S>,
     settings: &TrainSettings,
     updates: u64,
 ) -> anyhow::Result<()> {
-    let command = |data: &Dataset<S>| {
-        let card = data.card();
-        format!("nudge data {} --seed {} --count {} --noise {}", S::KIND, card.seed, data.len(), card.noise_share)
-    };
     if let Some(data) = &args.data {
-        card.data.insert("train".into(), command(&Dataset::open(data)?));
+        card.data.insert("train".into(), command(&Dataset::<S>::open(data)?));
     }
-    card.data.insert("test".into(), command(test));
     card.training = strings(settings)?;
     card.training.insert(UPDATES.into(), updates.to_string());
     Ok(())
+}
+
+/// The command that makes the samples of a directory.
+fn command<S: Sample>(data: &Dataset<S>) -> String {
+    let card = data.card();
+    format!("nudge data {} --seed {} --count {} --noise {}", S::KIND, card.seed, data.len(), card.noise_share)
 }
 
 /// Settings as the card's words.

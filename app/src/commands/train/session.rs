@@ -61,9 +61,7 @@ impl SessionArgs {
         }
         match self.from.as_deref() {
             None => Trainer::new(settings, layout, device),
-            Some(weights) if weights.extension().is_some_and(|extension| extension == "safetensors") => {
-                Trainer::begin_with(weights, settings, layout, device)
-            }
+            Some(weights) if is_weights(weights) => Trainer::begin_with(weights, settings, layout, device),
             Some(run) => Trainer::load(run, settings, layout, device),
         }
     }
@@ -131,6 +129,11 @@ impl SessionArgs {
         self.updates.is_some_and(|end| updates >= end)
             || self.minutes.is_some_and(|minutes| started.elapsed().as_secs_f64() >= 60.0 * minutes)
     }
+}
+
+/// Whether a path is of finished weights, not of a run.
+pub(super) fn is_weights(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "safetensors")
 }
 
 /// Opens a data directory and names what it has to skip.

@@ -47,7 +47,7 @@ impl PushTrainer {
     /// `observe` with the running mean of the weights as its sigma_m.
     pub fn with(&self, observe: Cnabu) -> Cnabu {
         let (net, store) = self.mean_net();
-        observe.with_push(net, store)
+        observe.with_push(net, store, 1.0)
     }
 
     /// Trains on the pushes of the next scenes, one update; `rate` scales the step size.

@@ -129,6 +129,34 @@ impl DeviceArgs {
     }
 }
 
+/// What beliefs are updated by, and what is weighed how.
+#[derive(clap::Args, Debug)]
+struct PlanningArgs {
+    /// How beliefs are updated: cnabu or classical (default: what a policy is published with)
+    #[arg(long)]
+    belief: Option<String>,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// The view array: standard300, real75, or a file
+    #[arg(long, default_value = "standard300")]
+    views: String,
+    /// Which voxels a view's gain counts: all that it may see, with the paper's rule, or those that no look has seen yet
+    /// (default: unseen with the cnabu belief, else all)
+    #[arg(long, value_name = "all|unseen")]
+    gain: Option<Counted>,
+    /// Push candidates drawn per decision
+    #[arg(long, default_value_t = PlannerSettings::default().candidates)]
+    candidates: usize,
+}
+
+impl PlanningArgs {
+    /// The planner's settings of a run: the way to count that was asked for, or the one that serves the belief best.
+    fn planner(&self, belief: &str) -> PlannerSettings {
+        let settings = PlannerSettings { candidates: self.candidates, ..PlannerSettings::default() };
+        settings.counting(self.gain.unwrap_or_else(|| Counted::of_belief(belief)))
+    }
+}
+
 /// What to say when networks are asked for in a build without them.
 #[cfg(not(feature = "cnabu"))]
 fn no_networks() -> nudge_core::Error {
@@ -138,10 +166,4 @@ fn no_networks() -> nudge_core::Error {
 /// Tells of something on standard error that does not stop the work.
 fn warn(message: &str) {
     eprintln!("warning: {message}");
-}
-
-/// The planner's settings of a run: the way to count that was asked for, or the one that serves the belief best.
-fn planner(gain: Option<Counted>, belief: &str, candidates: usize) -> PlannerSettings {
-    let settings = PlannerSettings { candidates, ..PlannerSettings::default() };
-    settings.counting(gain.unwrap_or_else(|| Counted::of_belief(belief)))
 }

@@ -9,7 +9,7 @@ use crate::driver::belief_update;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::belief::{CLASSICAL, CNABU};
-use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
+use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
@@ -56,21 +56,8 @@ struct RunArgs {
     /// Number of actions of an episode
     #[arg(long, default_value_t = 20, value_name = "B")]
     budget: usize,
-    /// How beliefs are updated: cnabu or classical (default: what each policy is published with)
-    #[arg(long)]
-    belief: Option<String>,
     #[command(flatten)]
-    device: super::DeviceArgs,
-    /// The view array: standard300, real75, or a file
-    #[arg(long, default_value = "standard300")]
-    views: String,
-    /// Which voxels a view's gain counts: all that it may see, with the paper's rule, or those that no look has seen yet
-    /// (default: unseen with the cnabu belief, else all)
-    #[arg(long, value_name = "all|unseen")]
-    gain: Option<Counted>,
-    /// Push candidates drawn per decision
-    #[arg(long, default_value_t = PlannerSettings::default().candidates)]
-    candidates: usize,
+    planning: super::PlanningArgs,
     /// The bench's directory
     #[arg(long, required = true, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -102,7 +89,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 fn run_bench(args: &RunArgs) -> anyhow::Result<()> {
-    args.device.choose()?;
+    args.planning.device.choose()?;
     let plan = plan(args)?;
     for BrokenScene { error, .. } in &plan.broken {
         warn(&format!("left out: {error}"));
@@ -148,14 +135,14 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     // One setting for the whole bench, so that its policies compare.
     let belief = if policies.iter().any(|plan| plan.belief == CNABU) { CNABU } else { CLASSICAL };
     let (sets, broken) = load_sets(&args.sets, &Catalog::standard())?;
-    nudge_core::camera::ViewArray::named(&args.views)?;
+    nudge_core::camera::ViewArray::named(&args.planning.views)?;
     Ok(Plan {
         format: crate::bench::FORMAT,
         version: nudge_core::VERSION.to_owned(),
         budget: args.budget,
         seeds: args.seeds,
-        views: args.views.clone(),
-        planner: super::planner(args.gain, belief, args.candidates),
+        views: args.planning.views.clone(),
+        planner: args.planning.planner(belief),
         policies,
         sets,
         broken,
@@ -176,7 +163,7 @@ fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
     let mut notes: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     let mut policies = Vec::new();
     for policy in kinds {
-        let (update, note) = belief_update(args.belief.as_deref(), policy)?;
+        let (update, note) = belief_update(args.planning.belief.as_deref(), policy)?;
         if let Some(note) = note {
             // The same words for every policy are said once.
             notes.entry(note.replace(policy.name(), "POLICY")).or_default().push(policy.name());

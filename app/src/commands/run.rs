@@ -5,7 +5,7 @@ use crate::record::mishaps;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
-use nudge_core::plan::{Action, Counted, PlannerSettings, PolicyKind, Reason};
+use nudge_core::plan::{Action, PolicyKind, Reason};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::score::{Scores, Verdict};
 use std::path::PathBuf;
@@ -19,9 +19,6 @@ pub struct Args {
     /// The rule that chooses actions
     #[arg(long, default_value = "mem")]
     policy: PolicyKind,
-    /// How beliefs are updated: cnabu or classical (default: what the policy is published with)
-    #[arg(long)]
-    belief: Option<String>,
     /// Number of actions
     #[arg(long, default_value_t = 20)]
     budget: usize,
@@ -29,17 +26,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
-    device: super::DeviceArgs,
-    /// The view array: standard300, real75, or a file
-    #[arg(long, default_value = "standard300")]
-    views: String,
-    /// Which voxels a view's gain counts: all that it may see, with the paper's rule, or those that no look has seen yet
-    /// (default: unseen with the cnabu belief, else all)
-    #[arg(long, value_name = "all|unseen")]
-    gain: Option<Counted>,
-    /// Push candidates drawn per decision
-    #[arg(long, default_value_t = PlannerSettings::default().candidates)]
-    candidates: usize,
+    planning: super::PlanningArgs,
     /// The episode's directory (default: out/SCENE-POLICY-SEED)
     #[arg(long)]
     out: Option<PathBuf>,
@@ -56,13 +43,13 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    args.device.choose()?;
+    args.planning.device.choose()?;
     let catalog = Arc::new(Catalog::standard());
     let (scene, warnings) = Scene::load(&args.scene, &catalog)?;
     for warning in warnings {
         super::warn(&format!("{}: {warning}", args.scene.display()));
     }
-    let (update, note) = belief_update(args.belief.as_deref(), args.policy)?;
+    let (update, note) = belief_update(args.planning.belief.as_deref(), args.policy)?;
     if let Some(note) = note {
         super::warn(&note);
     }
@@ -71,8 +58,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         belief: update.name().to_owned(),
         seed: args.seed,
         budget: args.budget,
-        views: args.views.clone(),
-        planner: super::planner(args.gain, update.name(), args.candidates),
+        views: args.planning.views.clone(),
+        planner: args.planning.planner(update.name()),
         noise: None,
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));

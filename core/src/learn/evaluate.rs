@@ -59,8 +59,7 @@ pub fn evaluate_pushes(
     let mut tallies = PushTallies::default();
     for at in 0..data.len() {
         let sample = data.get(at)?;
-        let prior = Belief::uniform(grid);
-        let belief = sample.views.iter().fold(prior, |belief, view| observe.observe(&belief, &view.observation));
+        let belief = after_views(observe, &grid, &sample.views);
         let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
         for (pushed, prediction) in sample.pushes.iter().zip(predict.predict_pushes(&belief, &pushes)) {
             let truth = truth_map(&grid, &pushed.truth, &pushed.labels);
@@ -86,8 +85,7 @@ pub fn fit_change_temperature(data: &Dataset<PushSample>, update: &dyn BeliefUpd
     let mut outcomes = Vec::new();
     for at in 0..data.len() {
         let sample = data.get(at)?;
-        let look = |belief: Belief, view: &ViewSample| update.observe(&belief, &view.observation);
-        let belief = sample.views.iter().fold(Belief::uniform(grid), look);
+        let belief = after_views(update, &grid, &sample.views);
         let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
         for (pushed, prediction) in sample.pushes.iter().zip(update.predict_pushes(&belief, &pushes)) {
             let changed = sample.changed_by(pushed);
@@ -146,19 +144,23 @@ pub fn evaluate_after_pushes(
         let sample = data.get(at)?;
         let Some(pushed) = sample.pushes.first() else { continue };
         let truth = truth_map(&grid, &pushed.truth, &pushed.labels);
-        let look = |belief: Belief, view: &ViewSample| update.observe(&belief, &view.observation);
-        let mut belief = sample.views.iter().fold(Belief::uniform(grid), look);
+        let mut belief = after_views(update, &grid, &sample.views);
         for prediction in update.predict_pushes(&belief, std::slice::from_ref(&pushed.push)) {
             belief.apply(&prediction);
         }
         tallies[0].merge(&Tally::of(&belief, &truth));
         for (tally, view) in tallies[1..].iter_mut().zip(&sample.after) {
-            belief = look(belief, view);
+            belief = update.observe(&belief, &view.observation);
             tally.merge(&Tally::of(&belief, &truth));
         }
         progress(at + 1);
     }
     Ok(tallies)
+}
+
+/// The belief after some views, from the uniform one.
+pub(super) fn after_views(update: &dyn BeliefUpdate, grid: &Grid, views: &[ViewSample]) -> Belief {
+    views.iter().fold(Belief::uniform(*grid), |belief, view| update.observe(&belief, &view.observation))
 }
 
 /// A truth without objects' numbers.

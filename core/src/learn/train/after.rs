@@ -6,8 +6,9 @@
 use super::batch::Batch;
 use super::kept::Kept;
 use crate::Result;
-use crate::belief::{Belief, BeliefUpdate, SweptPush};
+use crate::belief::{BeliefUpdate, SweptPush};
 use crate::cnabu::{Cnabu, Evidence, Layout, Mirror};
+use crate::learn::evaluate::after_views;
 use crate::learn::{Dataset, MapSample, PushSample};
 use crate::rng::ChaCha8Rng;
 use rand::Rng;
@@ -59,8 +60,7 @@ impl AfterPushes {
 
 /// What is believed of a sample after its views and the prediction of its first push.
 fn believed(layout: &Layout, sample: &PushSample, update: &Cnabu) -> Evidence {
-    let prior = Belief::uniform(*layout.grid());
-    let mut belief = sample.views.iter().fold(prior, |belief, view| update.observe(&belief, &view.observation));
+    let mut belief = after_views(update, layout.grid(), &sample.views);
     let first: Vec<SweptPush> = sample.pushes.iter().take(1).map(|pushed| pushed.push.clone()).collect();
     for prediction in update.predict_pushes(&belief, &first) {
         belief.apply(&prediction);

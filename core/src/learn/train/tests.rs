@@ -239,6 +239,7 @@ fn weights_go_to_a_file_and_come_back_and_bad_ones_are_told() {
         ("voxel_m = 0.005", "voxel_m = 0.01", "voxel_m: is 0.01"),
         ("\"chips_can\"", "\"teapot\"", "classes: is"),
         ("format = 1", "format = 7", "format: is 7"),
+        ("format = 1", "format = 1\nchange_temperature = 0.0", "change_temperature: 0.1 to 10"),
         ("sigma_o", "sigma_m", "network: is sigma_m"),
     ] {
         std::fs::write(crate::cnabu::card_path(&path), text.replacen(from, to, 1)).expect("written");

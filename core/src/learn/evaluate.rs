@@ -1,8 +1,8 @@
 //! How well a belief update does on held-out scenes, against the number of views.
 
-use super::{Dataset, MapSample, PushSample, VIEWS, VIEWS_AFTER, ViewSample};
+use super::{Dataset, MapSample, PushSample, PushedSample, VIEWS, VIEWS_AFTER, ViewSample};
 use crate::Result;
-use crate::belief::{Belief, BeliefUpdate};
+use crate::belief::{Belief, BeliefUpdate, PushPrediction};
 use crate::grid::{Grid, VoxelSet};
 use crate::score::Tally;
 use crate::world::TruthMap;
@@ -57,21 +57,35 @@ pub fn evaluate_pushes(
 ) -> Result<PushTallies> {
     let grid = data.grid();
     let mut tallies = PushTallies::default();
+    for_each_push(data, observe, predict, progress, &mut |sample, belief, pushed, prediction| {
+        let truth = truth_map(&grid, &pushed.truth, &pushed.labels);
+        let changed = sample.changed_by(pushed);
+        tallies.unchanged.merge(&Tally::of_cells(belief, &truth, &changed));
+        let mut after = belief.clone();
+        after.apply(prediction);
+        tallies.predicted.merge(&Tally::of_cells(&after, &truth, &changed));
+    })?;
+    Ok(tallies)
+}
+
+/// Calls `each` with every push of the samples: the sample, the belief after its views, the push, and its prediction.
+fn for_each_push(
+    data: &Dataset<PushSample>,
+    observe: &dyn BeliefUpdate,
+    predict: &dyn BeliefUpdate,
+    progress: &mut dyn FnMut(usize),
+    each: &mut dyn FnMut(&PushSample, &Belief, &PushedSample, &PushPrediction),
+) -> Result<()> {
     for at in 0..data.len() {
         let sample = data.get(at)?;
-        let belief = after_views(observe, &grid, &sample.views);
+        let belief = after_views(observe, &data.grid(), &sample.views);
         let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
         for (pushed, prediction) in sample.pushes.iter().zip(predict.predict_pushes(&belief, &pushes)) {
-            let truth = truth_map(&grid, &pushed.truth, &pushed.labels);
-            let changed = sample.changed_by(pushed);
-            tallies.unchanged.merge(&Tally::of_cells(&belief, &truth, &changed));
-            let mut after = belief.clone();
-            after.apply(&prediction);
-            tallies.predicted.merge(&Tally::of_cells(&after, &truth, &changed));
+            each(&sample, &belief, pushed, &prediction);
         }
         progress(at + 1);
     }
-    Ok(tallies)
+    Ok(())
 }
 
 /// What the log-odds of the predicted probabilities of change have to be divided by so that they fit best to what happened
@@ -83,16 +97,11 @@ pub fn evaluate_pushes(
 pub fn fit_change_temperature(data: &Dataset<PushSample>, update: &dyn BeliefUpdate) -> Result<f64> {
     let grid = data.grid();
     let mut outcomes = Vec::new();
-    for at in 0..data.len() {
-        let sample = data.get(at)?;
-        let belief = after_views(update, &grid, &sample.views);
-        let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
-        for (pushed, prediction) in sample.pushes.iter().zip(update.predict_pushes(&belief, &pushes)) {
-            let changed = sample.changed_by(pushed);
-            let cells = prediction.window.cells(&grid).zip(&prediction.change).filter(|(_, p)| **p > 0.0);
-            outcomes.extend(cells.map(|(cell, p)| (log_odds(f64::from(*p)), changed[cell])));
-        }
-    }
+    for_each_push(data, update, update, &mut |_| (), &mut |sample, _, pushed, prediction| {
+        let changed = sample.changed_by(pushed);
+        let cells = prediction.window.cells(&grid).zip(&prediction.change).filter(|(_, p)| **p > 0.0);
+        outcomes.extend(cells.map(|(cell, p)| (log_odds(f64::from(*p)), changed[cell])));
+    })?;
     Ok(best_temperature(&outcomes))
 }
 

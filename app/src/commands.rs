@@ -3,6 +3,7 @@
 use anyhow::Context;
 use clap::{Parser, Subcommand};
 use nudge_core::plan::{Counted, PlannerSettings};
+use nudge_core::push::PushSampler;
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
@@ -147,13 +148,18 @@ struct PlanningArgs {
     /// Push candidates drawn per decision
     #[arg(long, default_value_t = PlannerSettings::default().candidates)]
     candidates: usize,
+    /// Where they are drawn: at the frontier, as in the paper, or at what stands before space that no look has seen
+    /// (default: hidden where unseen voxels count, else frontier)
+    #[arg(long, value_name = "frontier|hidden")]
+    push_sampler: Option<PushSampler>,
 }
 
 impl PlanningArgs {
     /// The planner's settings of a run: the way to count that was asked for, or the one that serves the belief best.
     fn planner(&self, belief: &str) -> PlannerSettings {
         let settings = PlannerSettings { candidates: self.candidates, ..PlannerSettings::default() };
-        settings.counting(self.gain.unwrap_or_else(|| Counted::of_belief(belief)))
+        let settings = settings.counting(self.gain.unwrap_or_else(|| Counted::of_belief(belief)));
+        PlannerSettings { push_sampler: self.push_sampler.unwrap_or(settings.push_sampler), ..settings }
     }
 }
 

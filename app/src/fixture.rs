@@ -5,6 +5,7 @@ use nudge_core::belief::{Belief, BeliefUpdate, Classical, SweptPush};
 use nudge_core::camera::{self, ViewArray, ViewId};
 use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
+use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::score::{Scores, object_verdicts};
@@ -48,7 +49,7 @@ pub fn play(steps: usize) -> Played {
         let mut outcome = None;
         if index % 5 == 4 {
             let mut stream = rng::stream(7, "fixture-pushes", index as u64);
-            let candidates = nudge_core::push::sample(&belief, &arm, 80, &mut stream);
+            let candidates = sample(PushSampler::Frontier, &belief, None, &arm, 80, &mut stream);
             let mut rank = 0.0;
             decision.candidates = candidates
                 .iter()

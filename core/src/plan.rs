@@ -20,7 +20,7 @@ use crate::belief::{Belief, BeliefUpdate, CERTAIN, CNABU, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::gain::GainField;
 use crate::grid::VoxelSet;
-use crate::push::Rejection;
+use crate::push::{PushSampler, Rejection};
 use serde::{Deserialize, Serialize};
 
 /// Weight of the disturbance term.
@@ -274,6 +274,8 @@ pub struct PlannerSettings {
     pub counted: Counted,
     /// Push candidates drawn per decision.
     pub candidates: usize,
+    /// Where they are drawn. Pushes of policies that push at random come from the frontier all the same.
+    pub push_sampler: PushSampler,
     /// Weight of the disturbance term.
     pub gamma: f32,
     /// A push has to promise this many times what looking does: look if `patience IGV > IGM + gamma Reg`.
@@ -295,6 +297,7 @@ impl Default for PlannerSettings {
         Self {
             counted: Counted::default(),
             candidates: 80,
+            push_sampler: PushSampler::default(),
             gamma: GAMMA,
             patience: 1.0,
             certain: CERTAIN,
@@ -307,15 +310,26 @@ impl Default for PlannerSettings {
 }
 
 impl PlannerSettings {
-    /// These settings with what goes with a way to count: the paper's rule where all voxels count. Where only unseen ones
-    /// do, a push has to promise [`PATIENCE`] times what looking does, and the last [`RESTORING_STEPS`] steps look: a push
-    /// takes about that many looks to pay off.
+    /// These settings with what goes with a way to count: the paper's rule and its candidates where all voxels count. Where
+    /// only unseen ones do, pushes are aimed at what hides, have to promise [`PATIENCE`] times what looking does, and the last
+    /// [`RESTORING_STEPS`] steps look: a push takes about that many looks to pay off.
     pub fn counting(self, counted: Counted) -> Self {
-        let (patience, closing_steps) = match counted {
-            Counted::All => (1.0, CLOSING_STEPS),
-            Counted::Unseen => (PATIENCE, RESTORING_STEPS),
-        };
-        Self { counted, patience, closing_steps, ..self }
+        match counted {
+            Counted::All => Self {
+                counted,
+                push_sampler: PushSampler::Frontier,
+                patience: 1.0,
+                closing_steps: CLOSING_STEPS,
+                ..self
+            },
+            Counted::Unseen => Self {
+                counted,
+                push_sampler: PushSampler::Hidden,
+                patience: PATIENCE,
+                closing_steps: RESTORING_STEPS,
+                ..self
+            },
+        }
     }
 }
 

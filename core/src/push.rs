@@ -1,13 +1,19 @@
-//! Push candidates under a belief: frontier, sampling, collision checks.
+//! Push candidates under a belief: sampling and collision checks.
 //!
-//! The frontier is the first surely occupied voxel ([`CONFIDENT`]) seen from the shelf's entrance in each (x, z) column.
-//! A candidate starts [`STANDOFF_M`] before a random frontier point, at the tool's height [`TOOL_HEIGHT_M`] above the
-//! board, goes towards a random likely occupied voxel within [`REACH_M`] of the point, never back towards the entrance
-//! (that would pull objects over the edge), and is 50 to 150 mm long. It is feasible if the arm has a motion for it that
-//! touches neither the shelf nor what is believed to stand there, the target apart; see [`ArmClearance`].
+//! Where candidates come from is a choice, [`PushSampler`]. All start [`STANDOFF_M`] before a point of contact, at the
+//! tool's height [`TOOL_HEIGHT_M`] above the board, and are 50 to 150 mm long. A candidate is feasible if the arm has a motion
+//! for it that touches neither the shelf nor what is believed to stand there, the target apart; see [`ArmClearance`].
+//!
+//! * From the frontier, as in the paper: the frontier is the first surely occupied voxel ([`CONFIDENT`]) seen from the shelf's
+//!   entrance in each (x, z) column. A push starts before a random point of it and goes towards a random likely occupied voxel
+//!   within [`REACH_M`] of the point, never back towards the entrance.
+//! * Before what is hidden: a contact may be at any side but the back of what surely stands at the tool's height, the likelier
+//!   the more space behind it no look has seen; its direction is any that has room for the tip before the contact, from
+//!   across and 20 degrees back to the same on the other side.
 
 mod clearance;
 mod frontier;
+mod hidden;
 
 pub use clearance::{AVOIDED, ArmClearance};
 pub use frontier::frontier;
@@ -17,6 +23,7 @@ use crate::belief::{Belief, SweptPush};
 use crate::grid::{Grid, Voxel, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
 use frontier::likely_targets;
+use hidden::Contacts;
 use rand::Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -114,8 +121,8 @@ impl std::fmt::Display for Rejection {
 /// A sampled push with where it came from and why it was rejected, if it was.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// The frontier voxel it starts from.
-    pub frontier: Voxel,
+    /// The voxel that it is aimed at: of the frontier, or where something is to be touched.
+    pub contact: Voxel,
     /// The push and what the arm sweeps on its way there and along it; of a rejected one, what the gripper would along it.
     pub swept: SweptPush,
     /// `None` for a feasible candidate.
@@ -142,17 +149,96 @@ fn gripper_along(arm: &ArmTool, push: &Push, grid: &Grid) -> VoxelSet {
     swept
 }
 
+/// Where push candidates come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PushSampler {
+    /// From the frontier into the shelf, as in the paper.
+    #[default]
+    Frontier,
+    /// From the front or a side of what stands before space that no look has seen.
+    Hidden,
+}
+
+impl PushSampler {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Frontier, Self::Hidden];
+}
+
+impl std::fmt::Display for PushSampler {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Frontier => "frontier",
+            Self::Hidden => "hidden",
+        })
+    }
+}
+
+impl std::str::FromStr for PushSampler {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::ALL.into_iter().find(|sampler| sampler.to_string() == text);
+        named.ok_or_else(|| "there are frontier and hidden".to_owned())
+    }
+}
+
+/// A sampler prepared for a belief.
+enum Source {
+    /// The frontier, of which the points before the last drawn one are used up.
+    Frontier(Vec<Voxel>),
+    Hidden(Contacts),
+}
+
+impl Source {
+    fn new(sampler: PushSampler, belief: &Belief, seen: Option<&VoxelSet>) -> Self {
+        match sampler {
+            PushSampler::Frontier => Self::Frontier(frontier(belief)),
+            PushSampler::Hidden => Self::Hidden(Contacts::new(belief, seen)),
+        }
+    }
+
+    /// How often may be drawn for `count` feasible candidates.
+    fn draws(&self, count: usize) -> usize {
+        let most = count * DRAWS_PER_CANDIDATE;
+        match self {
+            Self::Frontier(points) => points.len().min(most),
+            Self::Hidden(contacts) if contacts.is_empty() => 0,
+            Self::Hidden(_) => most,
+        }
+    }
+
+    /// Draw number `number`: a point of contact, and the push against it if there is one.
+    fn draw(&mut self, number: usize, belief: &Belief, rng: &mut ChaCha8Rng) -> (Voxel, Option<Push>) {
+        match self {
+            Self::Frontier(points) => {
+                let chosen = rng.random_range(number..points.len());
+                points.swap(number, chosen);
+                (points[number], draw_push(belief, points[number], rng))
+            }
+            Self::Hidden(contacts) => contacts.draw(rng),
+        }
+    }
+}
+
 /// Draws candidates until `count` of them are feasible, and returns all of them, rejected ones too, in the order drawn.
 ///
-/// Frontier points are drawn without replacement. Drawing ends early when there are no more of them or after
-/// [`DRAWS_PER_CANDIDATE`] times `count`, so that there may be fewer feasible candidates than asked for, or none. The
-/// result depends on the belief and on the stream alone, not on the number of threads.
-pub fn sample(belief: &Belief, arm: &ArmTool, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
+/// Frontier points are drawn without replacement, contacts before what no look has `seen` with it. Drawing ends early when
+/// there are no more of them or after [`DRAWS_PER_CANDIDATE`] times `count`, so that there may be fewer feasible candidates
+/// than asked for, or none. The result depends on what is given and on the stream alone, not on the number of threads.
+pub fn sample(
+    sampler: PushSampler,
+    belief: &Belief,
+    seen: Option<&VoxelSet>,
+    arm: &ArmTool,
+    count: usize,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Candidate> {
     /// Draws that are checked together; fixed, so that it never matters who checks them.
     const BATCH: usize = 32;
     let (seed, clearance) = (rng.random(), ArmClearance::new(arm, belief));
-    let mut points = frontier(belief);
-    let draws = points.len().min(count * DRAWS_PER_CANDIDATE);
+    let mut source = Source::new(sampler, belief, seen);
+    let draws = source.draws(count);
     let mut candidates = Vec::new();
     let mut feasible = 0;
     for first in (0..draws).step_by(BATCH) {
@@ -160,10 +246,9 @@ pub fn sample(belief: &Belief, arm: &ArmTool, count: usize, rng: &mut ChaCha8Rng
             break;
         }
         let drawn: Vec<(u64, Voxel, Option<Push>)> = (first..draws.min(first + BATCH))
-            .map(|i| {
-                let j = rng.random_range(i..points.len());
-                points.swap(i, j);
-                (i as u64, points[i], draw_push(belief, points[i], rng))
+            .map(|number| {
+                let (point, push) = source.draw(number, belief, rng);
+                (number as u64, point, push)
             })
             .collect();
         let checked: Vec<Candidate> = drawn
@@ -201,13 +286,13 @@ fn candidate(
     belief: &Belief,
     clearance: &ArmClearance<'_>,
     mut rng: ChaCha8Rng,
-    frontier: Voxel,
+    contact: Voxel,
     drawn: Option<Push>,
 ) -> Candidate {
-    let aimless = Push { start: start_of(belief, frontier), direction_deg: 90.0, length_m: LENGTH_M[0] };
+    let aimless = Push { start: start_of(belief, contact), direction_deg: 90.0, length_m: LENGTH_M[0] };
     let push = drawn.unwrap_or(aimless);
     let motion = match drawn {
-        Some(_) => clearance.motion(&push, &clearance.target(frontier), &mut rng),
+        Some(_) => clearance.motion(&push, &clearance.target(contact), &mut rng),
         None => Err(Rejection::NoTarget),
     };
     let arm = clearance.tool();
@@ -216,7 +301,7 @@ fn candidate(
         Err(_) => gripper_along(arm, &push, &belief.grid),
     };
     let swept = SweptPush { push, swept };
-    Candidate { frontier, swept, rejection: motion.as_ref().err().cloned(), motion: motion.ok() }
+    Candidate { contact, swept, rejection: motion.as_ref().err().cloned(), motion: motion.ok() }
 }
 
 #[cfg(test)]

@@ -124,6 +124,7 @@ fn same_episode(
             ("--budget", config.budget.to_string()),
             ("--views", config.views.clone()),
             ("--gain", config.planner.counted.to_string()),
+            ("--push-sampler", config.planner.push_sampler.to_string()),
             ("--candidates", config.planner.candidates.to_string()),
         ]
     };

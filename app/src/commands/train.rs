@@ -108,6 +108,9 @@ pub(super) struct ObserveArgs {
     /// Most views in a sequence
     #[arg(long, default_value_t = 20)]
     max_views: usize,
+    /// Share of the scenes that are shifted (to 4 cm) and turned (to 8 degrees) on their board, beside mirroring
+    #[arg(long, default_value_t = 0.25)]
+    move_share: f64,
     /// Data of `nudge data pushes`: some sequences begin after a push, as the shipped networks predict it
     #[arg(long, value_name = "DIR")]
     pushes: Option<PathBuf>,

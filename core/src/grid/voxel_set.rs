@@ -68,6 +68,38 @@ impl VoxelSet {
         }
     }
 
+    /// The set whose column `i` (`height` voxels from `i height` on) is this one's column `sources[i]`.
+    pub fn with_columns_of(&self, height: usize, sources: &[usize]) -> Self {
+        debug_assert_eq!(sources.len() * height, self.voxel_count);
+        let mut moved = Self { words: vec![0; self.words.len()], voxel_count: self.voxel_count };
+        for (column, &source) in sources.iter().enumerate() {
+            for first in (0..height).step_by(64) {
+                let count = (height - first).min(64);
+                moved.add_bits(column * height + first, self.bits(source * height + first, count));
+            }
+        }
+        moved
+    }
+
+    /// At most 64 voxels from `first` on as the lowest bits of a word.
+    fn bits(&self, first: usize, count: usize) -> u64 {
+        let (word, shift) = (first / 64, first % 64);
+        let mut bits = self.words[word] >> shift;
+        if shift + count > 64 {
+            bits |= self.words[word + 1] << (64 - shift);
+        }
+        bits & (u64::MAX >> (64 - count))
+    }
+
+    /// Adds those of the 64 voxels from `first` on whose bits are set.
+    fn add_bits(&mut self, first: usize, bits: u64) {
+        let (word, shift) = (first / 64, first % 64);
+        self.words[word] |= bits << shift;
+        if shift > 0 && bits >> (64 - shift) != 0 {
+            self.words[word + 1] |= bits >> (64 - shift);
+        }
+    }
+
     /// Number of voxels in the set.
     pub fn len(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
@@ -123,6 +155,10 @@ mod tests {
             prop_assert_eq!((of(&a).len(), of(&a).is_empty()), (a.len(), a.is_empty()));
             prop_assert!((0..150).all(|index| of(&a).contains(index) == a.contains(&index)));
             prop_assert!(emptied.is_empty());
+            // Columns of 5 voxels lie across the words' borders.
+            let sources: Vec<usize> = (0..30).map(|column| (7 * column + 3) % 29).collect();
+            let moved = of(&a).with_columns_of(5, &sources);
+            prop_assert!((0..150).all(|i| moved.contains(i) == a.contains(&(sources[i / 5] * 5 + i % 5))));
             prop_assert_eq!(VoxelSet::from_words(&grid, of(&a).words().to_vec()), Some(of(&a)));
             prop_assert_eq!(VoxelSet::from_words(&grid, vec![0; 2]), None);
         }

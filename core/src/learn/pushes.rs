@@ -18,7 +18,7 @@ use crate::arm::ArmTool;
 use crate::arm::Push;
 use crate::belief::{Belief, BeliefUpdate, Classical, SweptPush};
 use crate::grid::{Grid, VoxelSet};
-use crate::push::{self, Candidate};
+use crate::push::{self, Candidate, PushSampler};
 use crate::rng::{derived_seed, stream};
 use crate::world::{TruthMap, World};
 use rand::Rng;
@@ -90,7 +90,7 @@ impl PushSample {
         let belief =
             views.iter().fold(Belief::uniform(grid), |belief, view| Classical.observe(&belief, &view.observation));
         let mut rng = stream(scene_seed, "sample pushes", 0);
-        let candidates = push::sample(&belief, &recipe.arm, PUSHES, &mut rng);
+        let candidates = push::sample(PushSampler::Frontier, &belief, None, &recipe.arm, PUSHES, &mut rng);
         let (mut pushes, mut after) = (Vec::new(), Vec::new());
         for candidate in candidates.into_iter().filter(|candidate| candidate.rejection.is_none()) {
             let mut world = world.clone();

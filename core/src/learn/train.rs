@@ -10,6 +10,7 @@ mod adam;
 mod after;
 mod batch;
 mod kept;
+mod moved;
 mod observe;
 mod push;
 mod state;
@@ -53,6 +54,9 @@ pub struct TrainSettings {
     pub semantic_weight: f64,
     /// Share of sigma_o's sequences that begin after a push, where there is data of pushes.
     pub push_share: f64,
+    /// Share of sigma_o's scenes that are shifted and turned a little on their board, beside mirroring.
+    #[serde(default)]
+    pub move_share: f64,
     /// How slowly the running mean of the weights follows: its share of the old mean.
     pub mean_decay: f64,
 }
@@ -69,6 +73,7 @@ impl Default for TrainSettings {
             kl_ramp: 1000,
             semantic_weight: 1.0,
             push_share: 0.0,
+            move_share: 0.0,
             mean_decay: 0.998,
         }
     }
@@ -84,6 +89,7 @@ impl TrainSettings {
             ("kl weight", (0.0..=10.0).contains(&self.kl_weight), "0 to 10"),
             ("semantic weight", (0.0..=100.0).contains(&self.semantic_weight), "0 to 100"),
             ("push share", (0.0..=1.0).contains(&self.push_share), "0 to 1"),
+            ("move share", (0.0..=1.0).contains(&self.move_share), "0 to 1"),
             ("mean decay", (0.0..1.0).contains(&self.mean_decay), "0 to below 1"),
         ];
         match sane.iter().find(|(_, ok, _)| !ok) {

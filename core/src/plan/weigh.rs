@@ -5,7 +5,7 @@ use crate::arm::PushMotion;
 use crate::belief::{Belief, PushPrediction, SweptPush};
 use crate::camera::{ViewArray, ViewId};
 use crate::gain::{GainField, Openings, RayDensity, RayGains, gain_of_views};
-use crate::push::{Candidate, sample};
+use crate::push::{Candidate, PushSampler, sample};
 use crate::rng::{ChaCha8Rng, stream};
 use rayon::prelude::*;
 
@@ -34,7 +34,8 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
 /// the coarse views together ([`Openings`]), and of these the best one after the winner is named, for the eye only.
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
-    let drawn = sample(belief, situation.arm, settings.candidates, &mut push_stream(situation));
+    let (sampler, count, mut rng) = (settings.push_sampler, settings.candidates, push_stream(situation));
+    let drawn = sample(sampler, belief, situation.seen, situation.arm, count, &mut rng);
     let mut candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let mut motions: Vec<Option<PushMotion>> = drawn.iter().map(|drawn| drawn.motion.clone()).collect();
     let (feasible, pushes): (Vec<usize>, Vec<SweptPush>) = drawn
@@ -111,9 +112,10 @@ impl Worth {
     }
 }
 
-/// Draws one feasible push at random, with those that were rejected on the way.
+/// Draws one feasible push at random, from the frontier as in the paper, with those that were rejected on the way.
 pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
-    let mut drawn = sample(situation.belief, situation.arm, 1, &mut push_stream(situation));
+    let (belief, arm) = (situation.belief, situation.arm);
+    let mut drawn = sample(PushSampler::Frontier, belief, None, arm, 1, &mut push_stream(situation));
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
     let motion = best.and_then(|at| drawn[at].motion.take());

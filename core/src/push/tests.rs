@@ -147,11 +147,11 @@ fn samples_are_what_the_method_says() {
         ([0.20, 0.26, 0.10, 0.16, TALL], 7),
     ]);
     let arm = arm();
-    let candidates = sample(&belief, &arm, 30, &mut stream(1, "pushes", 4));
+    let candidates = sample(PushSampler::Frontier, &belief, None, &arm, 30, &mut stream(1, "pushes", 4));
     assert_eq!(candidates.iter().filter(|c| c.rejection.is_none()).count(), 30);
     assert!(candidates.last().is_some_and(|c| c.rejection.is_none()), "drawing ends with the last one wanted");
     for candidate in &candidates {
-        let (push, point) = (&candidate.swept.push, belief.grid.center(candidate.frontier));
+        let (push, point) = (&candidate.swept.push, belief.grid.center(candidate.contact));
         assert!((0.0..=180.0).contains(&push.direction_deg), "{push:?}");
         assert!((LENGTH_M[0]..LENGTH_M[1]).contains(&push.length_m), "{push:?}");
         assert_eq!(push.start, [point.x, point.y - STANDOFF_M, TOOL_HEIGHT_M]);
@@ -170,9 +170,9 @@ fn samples_are_what_the_method_says() {
             assert!(inside.is_none_or(|voxel| swept.contains(belief.grid.index(voxel))), "{push:?}");
         }
     }
-    assert!(!candidates.is_sorted_by_key(|c| (c.frontier.x, c.frontier.z)), "drawn at random, not in order");
+    assert!(!candidates.is_sorted_by_key(|c| (c.contact.x, c.contact.z)), "drawn at random, not in order");
     for (i, a) in candidates.iter().enumerate() {
-        assert!(candidates[..i].iter().all(|b| a.frontier != b.frontier), "drawn twice");
+        assert!(candidates[..i].iter().all(|b| a.contact != b.contact), "drawn twice");
     }
 }
 
@@ -180,23 +180,27 @@ fn samples_are_what_the_method_says() {
 fn sampling_does_not_depend_on_the_number_of_threads_but_on_the_stream() {
     let belief = believed(&[([-0.25, -0.10, 0.15, 0.20, TALL], 3), ([0.0, 0.09, 0.22, 0.26, 0.12], 5)]);
     let arm = arm();
-    let on = |threads: usize, seed: u64| {
+    let on = |sampler: PushSampler, threads: usize, seed: u64| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        let drawn = pool.install(|| sample(&belief, &arm, 20, &mut stream(seed, "pushes", 0)));
-        drawn.into_iter().map(|c| (c.frontier, c.swept.push, c.rejection)).collect::<Vec<_>>()
+        let drawn = pool.install(|| sample(sampler, &belief, None, &arm, 20, &mut stream(seed, "pushes", 0)));
+        drawn.into_iter().map(|c| (c.contact, c.swept.push, c.rejection)).collect::<Vec<_>>()
     };
-    assert_eq!(on(1, 3), on(4, 3));
-    assert_ne!(on(1, 3), on(1, 4));
+    for sampler in PushSampler::ALL {
+        assert_eq!(on(sampler, 1, 3), on(sampler, 4, 3));
+        assert_ne!(on(sampler, 1, 3), on(sampler, 1, 4));
+    }
 }
 
 #[test]
 fn a_lone_voxel_is_no_target_and_an_empty_shelf_gives_no_candidate() {
     let mut belief = believed(&[]);
     let arm = arm();
-    assert!(sample(&belief, &arm, 10, &mut stream(1, "pushes", 0)).is_empty());
+    let drawn =
+        |sampler: PushSampler, belief: &Belief| sample(sampler, belief, None, &arm, 10, &mut stream(1, "pushes", 0));
+    assert!(PushSampler::ALL.iter().all(|sampler| drawn(*sampler, &belief).is_empty()));
     let index = belief.grid.index(voxel_at(&belief, 0.0, 0.2, 0.1));
     belief.occupancy[index] = evidence(3.0, 30.0);
-    let candidates = sample(&belief, &arm, 10, &mut stream(1, "pushes", 0));
+    let candidates = drawn(PushSampler::Frontier, &belief);
     assert_eq!(candidates.len(), 1);
     assert_eq!(candidates[0].rejection, Some(Rejection::NoTarget));
 }
@@ -204,8 +208,45 @@ fn a_lone_voxel_is_no_target_and_an_empty_shelf_gives_no_candidate() {
 #[test]
 fn a_shelf_that_is_full_gives_up_after_its_draws() {
     let belief = believed(&[([-0.4, 0.4, 0.0, 0.4, TALL], 3)]);
-    let candidates = sample(&belief, &arm(), 4, &mut stream(1, "pushes", 0));
-    assert!(candidates.len() <= 4 * DRAWS_PER_CANDIDATE);
+    for sampler in PushSampler::ALL {
+        let candidates = sample(sampler, &belief, None, &arm(), 4, &mut stream(1, "pushes", 0));
+        assert!(candidates.len() <= 4 * DRAWS_PER_CANDIDATE);
+    }
+}
+
+#[test]
+fn pushes_before_what_is_hidden_touch_a_side_of_what_hides_it() {
+    // A wall on the left with unknown space behind it, and a post on the right with everything seen behind it.
+    let mut belief = believed(&[([-0.25, -0.10, 0.15, 0.20, TALL], 3), ([0.15, 0.21, 0.15, 0.20, TALL], 5)]);
+    let (grid, arm) = (belief.grid, arm());
+    let mut seen = VoxelSet::empty(&grid);
+    for index in 0..grid.voxel_count() {
+        let at = grid.center(grid.voxel(index));
+        if at.x < 0.0 && at.y > 0.20 {
+            belief.occupancy[index] = [1.0, 1.0];
+        } else {
+            seen.insert(index);
+        }
+    }
+    let candidates = sample(PushSampler::Hidden, &belief, Some(&seen), &arm, 60, &mut stream(1, "pushes", 0));
+    assert!(candidates.iter().filter(|c| c.rejection.is_none()).count() > 20);
+    let at_wall = candidates.iter().filter(|c| grid.center(c.contact).x < 0.0).count();
+    assert!(10 * at_wall > 9 * candidates.len(), "{at_wall} of {}", candidates.len());
+    let mut across = 0;
+    for candidate in candidates.iter().filter(|c| c.rejection != Some(Rejection::NoTarget)) {
+        let (push, contact) = (&candidate.swept.push, grid.center(candidate.contact));
+        assert!(belief.probability(grid.index(candidate.contact)) > CONFIDENT);
+        let met = push.start_point() + push.direction() * STANDOFF_M;
+        assert!((met.x - contact.x).hypot(met.y - contact.y) < 1e-4, "{push:?}");
+        assert!((-20.0..200.0).contains(&push.direction_deg), "{push:?}");
+        // The tip starts clear of everything.
+        assert!(
+            grid.voxel_at(push.start_point()).is_none_or(|at| belief.probability(grid.index(at)) < 0.5),
+            "{push:?}"
+        );
+        across += usize::from(!(45.0..135.0).contains(&push.direction_deg));
+    }
+    assert!(5 * across > candidates.len(), "{across} of {} across", candidates.len());
 }
 
 #[test]

@@ -22,7 +22,8 @@ pub(super) fn run(args: &ObserveArgs) -> anyhow::Result<()> {
     let (data, val) = session.open::<MapSample>()?;
     let after = args.pushes.as_deref().map(after_pushes).transpose()?;
     let push_share = if after.is_some() { args.push_share } else { 0.0 };
-    let settings = TrainSettings { push_share, ..session.settings(args.width, args.max_views) };
+    let settings =
+        TrainSettings { push_share, move_share: args.move_share, ..session.settings(args.width, args.max_views) };
     let layout = Layout::new(&data.grid())?;
     let trainer: ObserveTrainer = session.trainer(settings, layout, device)?;
     let (parameters, updates) = (trainer.parameters(), trainer.updates());

@@ -1,5 +1,6 @@
 //! Samples as tensors in the network's layout.
 
+use super::moved::Moved;
 use crate::Result;
 use crate::cnabu::{Layout, Mirror};
 use crate::learn::{Dataset, MapSample};
@@ -12,23 +13,31 @@ use tch::Tensor;
 /// Sub-cells of a pixel.
 const SUBS: usize = 4;
 
-/// A few samples, some of them mirrored.
+/// A few samples, some of them mirrored, some moved.
 pub(super) struct Batch<'a> {
     layout: &'a Layout,
     samples: Vec<(MapSample, Mirror)>,
 }
 
 impl<'a> Batch<'a> {
-    /// Draws samples and whether they are mirrored.
+    /// Draws samples, whether they are mirrored, and for a share of them a small move.
     pub(super) fn draw(
         data: &Dataset<MapSample>,
         layout: &'a Layout,
         count: usize,
+        move_share: f64,
         rng: &mut ChaCha8Rng,
     ) -> Result<Self> {
-        let drawn: Vec<(usize, Mirror)> =
-            (0..count).map(|_| (rng.random_range(0..data.len()), Mirror::either(rng))).collect();
-        let samples = drawn.into_par_iter().map(|(at, mirror)| Ok((data.get(at)?, mirror)));
+        let mut draw = || {
+            let (at, mirror) = (rng.random_range(0..data.len()), Mirror::either(rng));
+            let moved = (rng.random::<f64>() < move_share).then(|| Moved::random(layout.grid(), rng));
+            (at, mirror, moved)
+        };
+        let drawn: Vec<(usize, Mirror, Option<Moved>)> = (0..count).map(|_| draw()).collect();
+        let samples = drawn.into_par_iter().map(|(at, mirror, moved)| {
+            let sample = data.get(at)?;
+            Ok((if let Some(moved) = moved { moved.sample(&sample) } else { sample }, mirror))
+        });
         Ok(Self::of(layout, samples.collect::<Result<_>>()?))
     }
 

@@ -57,7 +57,7 @@ impl ObserveTrainer {
                 (sequence(VIEWS_AFTER, longest.min(2 * VIEWS_AFTER), &mut rng), batch, prior.to_device(device))
             }
             None => {
-                let batch = Batch::draw(data, &layout, count, &mut rng)?;
+                let batch = Batch::draw(data, &layout, count, self.settings.move_share, &mut rng)?;
                 (sequence(VIEWS, longest, &mut rng), batch, Evidence::uniform(count as i64, [x, y], device))
             }
         };

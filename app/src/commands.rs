@@ -149,17 +149,16 @@ struct PlanningArgs {
     #[arg(long, default_value_t = PlannerSettings::default().candidates)]
     candidates: usize,
     /// Where they are drawn: at the frontier, as in the paper, or at what stands before space that no look has seen
-    /// (default: hidden where unseen voxels count, else frontier)
-    #[arg(long, value_name = "frontier|hidden")]
-    push_sampler: Option<PushSampler>,
+    #[arg(long, value_name = "frontier|hidden", default_value_t)]
+    push_sampler: PushSampler,
 }
 
 impl PlanningArgs {
     /// The planner's settings of a run: the way to count that was asked for, or the one that serves the belief best.
     fn planner(&self, belief: &str) -> PlannerSettings {
-        let settings = PlannerSettings { candidates: self.candidates, ..PlannerSettings::default() };
-        let settings = settings.counting(self.gain.unwrap_or_else(|| Counted::of_belief(belief)));
-        PlannerSettings { push_sampler: self.push_sampler.unwrap_or(settings.push_sampler), ..settings }
+        let (candidates, push_sampler) = (self.candidates, self.push_sampler);
+        let settings = PlannerSettings { candidates, push_sampler, ..PlannerSettings::default() };
+        settings.counting(self.gain.unwrap_or_else(|| Counted::of_belief(belief)))
     }
 }
 

@@ -310,26 +310,15 @@ impl Default for PlannerSettings {
 }
 
 impl PlannerSettings {
-    /// These settings with what goes with a way to count: the paper's rule and its candidates where all voxels count. Where
-    /// only unseen ones do, pushes are aimed at what hides, have to promise [`PATIENCE`] times what looking does, and the last
-    /// [`RESTORING_STEPS`] steps look: a push takes about that many looks to pay off.
+    /// These settings with what goes with a way to count: the paper's rule where all voxels count. Where only unseen ones
+    /// do, a push has to promise [`PATIENCE`] times what looking does, and the last [`RESTORING_STEPS`] steps look: a push
+    /// takes about that many looks to pay off.
     pub fn counting(self, counted: Counted) -> Self {
-        match counted {
-            Counted::All => Self {
-                counted,
-                push_sampler: PushSampler::Frontier,
-                patience: 1.0,
-                closing_steps: CLOSING_STEPS,
-                ..self
-            },
-            Counted::Unseen => Self {
-                counted,
-                push_sampler: PushSampler::Hidden,
-                patience: PATIENCE,
-                closing_steps: RESTORING_STEPS,
-                ..self
-            },
-        }
+        let (patience, closing_steps) = match counted {
+            Counted::All => (1.0, CLOSING_STEPS),
+            Counted::Unseen => (PATIENCE, RESTORING_STEPS),
+        };
+        Self { counted, patience, closing_steps, ..self }
     }
 }
 

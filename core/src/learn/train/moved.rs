@@ -101,6 +101,7 @@ mod tests {
         // A quarter turn: a post in the middle stays, one 30 cells to the right of it comes to 30 cells behind it.
         assert_eq!(moved([0.0; 2], 90.0, 79, 39), at(79, 39));
         assert_eq!(moved([0.0; 2], 90.0, 109, 39), at(79, 69));
+        assert_eq!(moved([0.0; 2], 90.0, 79, 69), at(49, 39));
         // What is pushed over the edge is gone, and the edge's column stands in for what comes from beyond it.
         assert_eq!(moved([0.04, 0.0], 0.0, 157, 10).truth.len(), 0);
         assert_eq!(moved([0.04, 0.0], 0.0, 0, 10).truth.len(), 2 * 10 * 7);

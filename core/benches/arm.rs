@@ -6,7 +6,7 @@ use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, level_t
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, project, render};
 use nudge_core::grid::VoxelSet;
-use nudge_core::push::sample;
+use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng::stream;
 use nudge_core::scene::{Catalog, RobotPlacement, Scene};
 use nudge_core::world::{TruthMap, World};
@@ -200,7 +200,7 @@ fn pushes(scenes: &[Crowded]) {
         }
         let tool = ArmTool::standard(scene.shelf);
         let (wall, processor) = (Instant::now(), process_s());
-        let candidates = sample(&belief, &tool, 80, &mut stream(1, "pushes", 0));
+        let candidates = sample(PushSampler::Frontier, &belief, None, &tool, 80, &mut stream(1, "pushes", 0));
         let (wall, processor) = (wall.elapsed().as_secs_f64(), process_s() - processor);
         let feasible: Vec<_> = candidates.iter().filter_map(|c| c.motion.as_ref()).collect();
         println!(

@@ -22,7 +22,7 @@ use crate::arm::{ArmTool, Hit, Obstacle, Push, PushMotion, level_tool};
 use crate::belief::{Belief, SweptPush};
 use crate::grid::{Grid, Voxel, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
-use frontier::likely_targets;
+use frontier::{Frontier, start_of};
 use hidden::Contacts;
 use rand::Rng;
 use rayon::prelude::*;
@@ -184,16 +184,15 @@ impl std::str::FromStr for PushSampler {
 }
 
 /// A sampler prepared for a belief.
-enum Source {
-    /// The frontier, of which the points before the last drawn one are used up.
-    Frontier(Vec<Voxel>),
+enum Source<'a> {
+    Frontier(Frontier<'a>),
     Hidden(Contacts),
 }
 
-impl Source {
-    fn new(sampler: PushSampler, belief: &Belief, seen: Option<&VoxelSet>) -> Self {
+impl<'a> Source<'a> {
+    fn new(sampler: PushSampler, belief: &'a Belief, seen: Option<&VoxelSet>) -> Self {
         match sampler {
-            PushSampler::Frontier => Self::Frontier(frontier(belief)),
+            PushSampler::Frontier => Self::Frontier(Frontier::new(belief)),
             PushSampler::Hidden => Self::Hidden(Contacts::new(belief, seen)),
         }
     }
@@ -202,20 +201,16 @@ impl Source {
     fn draws(&self, count: usize) -> usize {
         let most = count * DRAWS_PER_CANDIDATE;
         match self {
-            Self::Frontier(points) => points.len().min(most),
+            Self::Frontier(frontier) => frontier.left().min(most),
             Self::Hidden(contacts) if contacts.is_empty() => 0,
             Self::Hidden(_) => most,
         }
     }
 
-    /// Draw number `number`: a point of contact, and the push against it if there is one.
-    fn draw(&mut self, number: usize, belief: &Belief, rng: &mut ChaCha8Rng) -> (Voxel, Option<Push>) {
+    /// The next draw, of no more than there are: a point of contact, and the push against it if there is one.
+    fn draw(&mut self, rng: &mut ChaCha8Rng) -> (Voxel, Option<Push>) {
         match self {
-            Self::Frontier(points) => {
-                let chosen = rng.random_range(number..points.len());
-                points.swap(number, chosen);
-                (points[number], draw_push(belief, points[number], rng))
-            }
+            Self::Frontier(frontier) => frontier.draw(rng),
             Self::Hidden(contacts) => contacts.draw(rng),
         }
     }
@@ -247,7 +242,7 @@ pub fn sample(
         }
         let drawn: Vec<(u64, Voxel, Option<Push>)> = (first..draws.min(first + BATCH))
             .map(|number| {
-                let (point, push) = source.draw(number, belief, rng);
+                let (point, push) = source.draw(rng);
                 (number as u64, point, push)
             })
             .collect();
@@ -263,22 +258,6 @@ pub fn sample(
         }
     }
     candidates
-}
-
-/// Where a push from a frontier point starts: before the point, at the tool's height.
-fn start_of(belief: &Belief, frontier: Voxel) -> [f32; 3] {
-    let point = belief.grid.center(frontier);
-    [point.x, point.y - STANDOFF_M, belief.grid.origin[2] + TOOL_HEIGHT_M]
-}
-
-/// A push from a frontier point towards something likely; `None` when nothing likely is near. Always draws as much.
-fn draw_push(belief: &Belief, frontier: Voxel, rng: &mut ChaCha8Rng) -> Option<Push> {
-    let (which, length_m) = (rng.random::<f64>(), rng.random_range(LENGTH_M[0]..LENGTH_M[1]));
-    let start = start_of(belief, frontier);
-    let targets = likely_targets(belief, frontier, start[1]);
-    let target = belief.grid.center(*targets.get((which * targets.len() as f64) as usize)?);
-    let direction_deg = (target.y - start[1]).atan2(target.x - start[0]).to_degrees();
-    Some(Push { start, direction_deg, length_m })
 }
 
 /// Checks a drawn push. One without a target is kept as the straight push that it would have been.

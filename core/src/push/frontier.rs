@@ -1,8 +1,54 @@
-//! The frontier: where the known things begin, seen from the shelf's entrance.
+//! The frontier: where the known things begin, seen from the shelf's entrance; and pushes from it into the shelf.
 
-use super::{CONFIDENT, LIKELY, REACH_M};
+use super::{CONFIDENT, LENGTH_M, LIKELY, REACH_M, STANDOFF_M, TOOL_HEIGHT_M};
+use crate::arm::Push;
 use crate::belief::Belief;
 use crate::grid::Voxel;
+use crate::rng::ChaCha8Rng;
+use rand::Rng;
+
+/// The frontier of a belief, from which points are drawn without replacement.
+pub(super) struct Frontier<'a> {
+    belief: &'a Belief,
+    /// Those before `next` are used up.
+    points: Vec<Voxel>,
+    next: usize,
+}
+
+impl<'a> Frontier<'a> {
+    pub(super) fn new(belief: &'a Belief) -> Self {
+        Self { belief, points: frontier(belief), next: 0 }
+    }
+
+    /// How many points are left to draw.
+    pub(super) fn left(&self) -> usize {
+        self.points.len() - self.next
+    }
+
+    /// One of the points that are left, and a push from it towards something likely; no push where nothing likely is near.
+    /// Always draws as much.
+    pub(super) fn draw(&mut self, rng: &mut ChaCha8Rng) -> (Voxel, Option<Push>) {
+        let chosen = rng.random_range(self.next..self.points.len());
+        self.points.swap(self.next, chosen);
+        let point = self.points[self.next];
+        self.next += 1;
+        let (which, length_m) = (rng.random::<f64>(), rng.random_range(LENGTH_M[0]..LENGTH_M[1]));
+        let start = start_of(self.belief, point);
+        let targets = likely_targets(self.belief, point, start[1]);
+        let towards = |target: &Voxel| {
+            let target = self.belief.grid.center(*target);
+            let direction_deg = (target.y - start[1]).atan2(target.x - start[0]).to_degrees();
+            Push { start, direction_deg, length_m }
+        };
+        (point, targets.get((which * targets.len() as f64) as usize).map(towards))
+    }
+}
+
+/// Where a push from a frontier point starts: before the point, at the tool's height.
+pub(super) fn start_of(belief: &Belief, frontier: Voxel) -> [f32; 3] {
+    let point = belief.grid.center(frontier);
+    [point.x, point.y - STANDOFF_M, belief.grid.origin[2] + TOOL_HEIGHT_M]
+}
 
 /// The first voxel with `p >= 0.85` seen from the shelf's entrance in every (x, z) column, in ascending order of x, then
 /// z; columns without one are left out.

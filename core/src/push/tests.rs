@@ -1,3 +1,4 @@
+use super::frontier::likely_targets;
 use super::*;
 use crate::belief::evidence;
 use crate::grid::Grid;

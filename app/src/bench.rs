@@ -13,7 +13,7 @@ mod summary;
 mod work;
 
 pub use merge::merge;
-pub use plan::{BrokenScene, EpisodeId, FORMAT, Plan, PolicyPlan, ScenePlan, SetPlan, Shard, load_sets};
+pub use plan::{BrokenScene, EpisodeId, FORMAT, Plan, PolicyPlan, ScenePlan, SetPlan, load_sets};
 pub use result::{EpisodeResult, EpisodeSeconds, StepResult, VerdictCounts};
 pub use store::BenchDir;
 pub use summary::{SummaryRow, summarise};

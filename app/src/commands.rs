@@ -1,9 +1,8 @@
 //! The command line: one file per subcommand.
 
+use crate::planner_args::PlannerArgs;
 use anyhow::Context;
 use clap::{Parser, Subcommand};
-use nudge_core::plan::{Counted, PlannerSettings};
-use nudge_core::push::PushSampler;
 use serde::Serialize;
 use std::io::Write;
 use std::process::ExitCode;
@@ -141,25 +140,8 @@ struct PlanningArgs {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
-    /// Which voxels a view's gain counts: all that it may see, with the paper's rule, or those that no look has seen yet
-    /// (default: unseen with the cnabu belief, else all)
-    #[arg(long, value_name = "all|unseen")]
-    gain: Option<Counted>,
-    /// Push candidates drawn per decision
-    #[arg(long, default_value_t = PlannerSettings::default().candidates)]
-    candidates: usize,
-    /// Where they are drawn: at the frontier, as in the paper, or at what stands before space that no look has seen
-    #[arg(long, value_name = "frontier|hidden", default_value_t)]
-    push_sampler: PushSampler,
-}
-
-impl PlanningArgs {
-    /// The planner's settings of a run: the way to count that was asked for, or the one that serves the belief best.
-    fn planner(&self, belief: &str) -> PlannerSettings {
-        let (candidates, push_sampler) = (self.candidates, self.push_sampler);
-        let settings = PlannerSettings { candidates, push_sampler, ..PlannerSettings::default() };
-        settings.counting(self.gain.unwrap_or_else(|| Counted::of_belief(belief)))
-    }
+    #[command(flatten)]
+    planner: PlannerArgs,
 }
 
 /// What to say when networks are asked for in a build without them.

@@ -12,6 +12,7 @@ pub mod figure;
 #[cfg(test)]
 mod fixture;
 pub mod picture;
+pub mod planner_args;
 pub mod record;
 pub mod regress;
 pub mod report;

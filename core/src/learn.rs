@@ -22,7 +22,7 @@ mod train;
 pub use card::{Card, Kind, NAME as CARD_NAME};
 pub use dataset::Dataset;
 pub use evaluate::{PushTallies, evaluate, evaluate_after_pushes, evaluate_pushes, fit_change_temperature};
-pub use make::{Job, Progress, make};
+pub use make::{Progress, make};
 pub use maps::{MapSample, Recipe, ViewSample};
 pub use pushes::{PUSHES, PushSample, PushedSample, VIEWS_AFTER};
 pub use shard::SAMPLES_PER_SHARD;

@@ -24,6 +24,7 @@ pub mod push;
 pub mod rng;
 pub mod scene;
 pub mod score;
+pub mod shard;
 pub mod solid;
 pub mod world;
 

@@ -3,16 +3,19 @@
 //! Everything is counted in the scored volume, the grid below [`SCORED_HEIGHT_M`], so that the empty air above does not
 //! flatter. [`Scores::of`] judges one belief; a [`Tally`] keeps the counts behind the scores, and tallies merged over a
 //! set of scenes give the set's scores from one confusion matrix. [`object_verdicts`] says what became of each object;
-//! [`Interval`] is a mean over scenes with its confidence interval.
+//! [`Interval`] is a mean over scenes with its confidence interval; [`scores_without`] tells what could be known without
+//! some objects.
 
 mod confusion;
 mod interval;
+mod known;
 mod objects;
 mod reliability;
 mod tally;
 
 pub use confusion::Confusion;
 pub use interval::{Interval, RESAMPLES, deviation, mean};
+pub use known::scores_without;
 pub use objects::{SPECK_M2, object_verdicts};
 pub use reliability::{BIN_COUNT, Reliability, ReliabilityBin};
 pub use tally::Tally;

@@ -157,6 +157,7 @@ fn a_report_is_one_page_with_everything_in_it() {
     let said = nudge_ok(&["report", &out]);
     let page = std::fs::read_to_string(said.trim()).expect("the page that was named");
     assert!(page.matches("<svg").count() >= 5 + 2 && page.contains("Paired differences"), "parts are missing");
+    assert!(page.contains("A perfect map that lacks them"), "no word of what looking can reach");
     let foreign = page.replace("http://www.w3.org/2000/svg", "");
     assert!(!foreign.contains("http://") && !foreign.contains("https://") && !foreign.contains("<script"));
     let png = bench.path("b/report/small-semantic-miou.png");

@@ -23,6 +23,8 @@ fn shipped_scenes_pass_their_check_and_the_hard_ones_hide_objects() {
         for scene in report["scenes"].as_array().expect("one entry per file") {
             let hidden = scene["hidden"].as_array().expect("hidden").len();
             assert!(hidden >= at_least, "{}: {hidden} objects are hidden", scene["file"]);
+            let without = scene["without_hidden"]["semantic_miou"].as_f64().expect("a score");
+            assert_eq!(without < 1.0, hidden > 0, "{}: mIoU {without} without what is hidden", scene["file"]);
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Joining the directories of shards into one bench.
 
-use super::plan::{Plan, Shard};
+use super::plan::Plan;
 use super::store::BenchDir;
 use nudge_core::files::TEMPORARY;
+use nudge_core::shard::Shard;
 use nudge_core::{Error, Result};
 use std::collections::BTreeMap;
 use std::fs;

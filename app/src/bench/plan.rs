@@ -3,12 +3,11 @@
 use nudge_core::files::names_in;
 use nudge_core::plan::{PlannerSettings, PolicyKind};
 use nudge_core::scene::{Catalog, Scene};
+use nudge_core::shard::Shard;
 use nudge_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::fmt;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 /// The format number of `bench.json`.
 pub const FORMAT: u32 = 1;
@@ -79,32 +78,6 @@ pub struct BrokenScene {
     pub error: String,
 }
 
-/// The `index`-th of every `count` episodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Shard {
-    /// From 0.
-    pub index: usize,
-    /// Number of shards.
-    pub count: usize,
-}
-
-impl fmt::Display for Shard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.index, self.count)
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        let wrong = || format!("`{text}` is no shard: the first of four is 0/4, the last 3/4");
-        let (index, count) = text.split_once('/').ok_or_else(wrong)?;
-        let shard = Self { index: index.parse().map_err(|_| wrong())?, count: count.parse().map_err(|_| wrong())? };
-        if shard.index < shard.count { Ok(shard) } else { Err(wrong()) }
-    }
-}
-
 /// One episode of a bench, by positions in its plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct EpisodeId {
@@ -122,9 +95,9 @@ impl Plan {
     /// All episodes of the plan, or of its shard, in the order in which they run: first every scene and policy with
     /// seed 0, so that an early look at the results sees all of them.
     pub fn episodes(&self) -> Vec<EpisodeId> {
-        let Shard { index, count } = self.shard.unwrap_or(Shard { index: 0, count: 1 });
-        let all = self.all_episodes();
-        all.into_iter().enumerate().filter(|(at, _)| at % count == index).map(|(_, episode)| episode).collect()
+        let shard = self.shard.unwrap_or_default();
+        let mine = self.all_episodes().into_iter().enumerate().filter(|(at, _)| shard.has(*at));
+        mine.map(|(_, episode)| episode).collect()
     }
 
     fn all_episodes(&self) -> Vec<EpisodeId> {
@@ -162,12 +135,11 @@ impl Plan {
             plan.policies.iter().map(name).collect::<Vec<_>>().join(", ")
         };
         let shard = |plan: &Self| plan.shard.map_or("no shard".to_owned(), |shard| format!("shard {shard}"));
-        let settings: [(&str, String, String); 7] = [
+        let settings: [(&str, String, String); 6] = [
             ("version", before.version.clone(), self.version.clone()),
             ("budget", before.budget.to_string(), self.budget.to_string()),
             ("number of seeds", before.seeds.to_string(), self.seeds.to_string()),
             ("view array", before.views.clone(), self.views.clone()),
-            ("number of push candidates", before.planner.candidates.to_string(), self.planner.candidates.to_string()),
             ("policies", policies(before), policies(self)),
             ("shard", shard(before), shard(self)),
         ];
@@ -175,7 +147,16 @@ impl Plan {
         if let Some((what, before, now)) = differs {
             return Some(format!("the {what} was {before}, now it is {now}"));
         }
-        self.scene_difference(before)
+        self.planner_difference(before).or_else(|| self.scene_difference(before))
+    }
+
+    /// The first of the planner's numbers that differs, by its name in `bench.json`.
+    fn planner_difference(&self, before: &Self) -> Option<String> {
+        let fields = |plan: &Self| serde_json::to_value(plan.planner).expect("numbers and names become JSON");
+        let (now, before) = (fields(self), fields(before));
+        let (name, value) = now.as_object()?.iter().find(|(name, value)| before.get(name) != Some(value))?;
+        let before = before.get(name).cloned().unwrap_or_default();
+        Some(format!("the planner's {name} was {before}, now it is {value}"))
     }
 
     fn scene_difference(&self, before: &Self) -> Option<String> {
@@ -311,14 +292,6 @@ mod tests {
     }
 
     #[test]
-    fn a_shard_is_read_from_its_own_words() {
-        assert_eq!("2/3".parse(), Ok(Shard { index: 2, count: 3 }));
-        for wrong in ["3/3", "1", "a/b", "-1/2", "0/0"] {
-            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
     fn what_differs_is_named() {
         let before = plan(None);
         assert_eq!(before.difference(&before), None);
@@ -328,6 +301,9 @@ mod tests {
         let mut other = before.clone();
         other.budget = 40;
         assert_eq!(other.difference(&before).as_deref(), Some("the budget was 20, now it is 40"));
+        let mut eager = before.clone();
+        eager.planner.patience = 3.0;
+        assert_eq!(eager.difference(&before).as_deref(), Some("the planner's patience was 1.0, now it is 3.0"));
         let mut fewer = before.clone();
         let gone = fewer.sets[0].scenes.remove(1);
         assert_eq!(fewer.difference(&before).as_deref(), Some("scene a/y is gone"));

@@ -2,8 +2,8 @@
 
 use super::{print, to_json, warn};
 use crate::bench::{
-    BenchDir, BrokenScene, EpisodeId, EpisodeResult, Event, Plan, PolicyPlan, Shard, SummaryRow, Workers, load_sets,
-    merge, run as work, summarise,
+    BenchDir, BrokenScene, EpisodeId, EpisodeResult, Event, Plan, PolicyPlan, SummaryRow, Workers, load_sets, merge,
+    run as work, summarise,
 };
 use crate::driver::belief_update;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -11,6 +11,7 @@ use nudge_core::Error;
 use nudge_core::belief::{CLASSICAL, CNABU};
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
+use nudge_core::shard::Shard;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -142,7 +143,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         budget: args.budget,
         seeds: args.seeds,
         views: args.planning.views.clone(),
-        planner: args.planning.planner(belief),
+        planner: args.planning.planner.settings(belief),
         policies,
         sets,
         broken,

@@ -4,8 +4,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::arm::ArmTool;
 use nudge_core::camera::ViewArray;
-use nudge_core::learn::{Card, Dataset, Job, Kind, MapSample, Progress, PushSample, Recipe, Sample, make};
+use nudge_core::learn::{Card, Dataset, Kind, MapSample, Progress, PushSample, Recipe, Sample, make};
 use nudge_core::scene::{Catalog, GenerateConfig};
+use nudge_core::shard::Shard;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
@@ -42,7 +43,7 @@ struct MakeArgs {
     out: PathBuf,
     /// Make the i-th of every n shards only, i from 0: several processes may share a directory
     #[arg(long, value_name = "i/n", default_value = "0/1")]
-    shard: Job,
+    shard: Shard,
     /// Share of samples observed with sensor noise
     #[arg(long, default_value_t = 0.25)]
     noise: f32,

@@ -1,6 +1,7 @@
 //! `nudge run`: map a scene with a policy and write the episode.
 
 use crate::driver::{Driver, belief_update, default_out};
+use crate::planner_args;
 use crate::record::mishaps;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
@@ -59,7 +60,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         seed: args.seed,
         budget: args.budget,
         views: args.planning.views.clone(),
-        planner: args.planning.planner(update.name()),
+        planner: args.planning.planner.settings(update.name()),
         noise: None,
     };
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));
@@ -117,16 +118,14 @@ fn same_episode(
     out: &std::path::Path,
 ) -> Result<(), Error> {
     let settings = |config: &EpisodeConfig| {
-        [
+        let whole = [
             ("--policy", config.policy.to_string()),
             ("--belief", config.belief.clone()),
             ("--seed", config.seed.to_string()),
             ("--budget", config.budget.to_string()),
             ("--views", config.views.clone()),
-            ("--gain", config.planner.counted.to_string()),
-            ("--push-sampler", config.planner.push_sampler.to_string()),
-            ("--candidates", config.planner.candidates.to_string()),
-        ]
+        ];
+        whole.into_iter().chain(planner_args::options(&config.planner))
     };
     if logged.scene != *scene {
         let message = format!(
@@ -135,7 +134,7 @@ fn same_episode(
         );
         return Err(Error::input(out, "", message));
     }
-    for ((name, before), (_, now)) in settings(&logged.config).into_iter().zip(settings(config)) {
+    for ((name, before), (_, now)) in settings(&logged.config).zip(settings(config)) {
         if before != now {
             return Err(Error::input(out, "", format!("the episode there was run with {name} {before}, not {now}")));
         }

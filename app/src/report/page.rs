@@ -38,6 +38,7 @@ impl Page {
                 continue;
             }
             body += &set_title(in_set);
+            body += &scenes::without_hidden(results, set, &catalog)?;
             body += "<div class=\"figures\">\n";
             for Figure { name, caption, chart } in charts::of_set(results, set) {
                 let svg = chart.svg(SIZE);

@@ -4,14 +4,39 @@ use super::results::{Finished, Metric, Results};
 use super::tables::reference;
 use crate::figure::{RasterStyle, Svg, escape};
 use crate::picture::{self, View};
+use crate::planner_args;
 use nudge_core::Result;
-use nudge_core::scene::Catalog;
+use nudge_core::scene::{Catalog, ObjectId};
+use nudge_core::score::{mean, scores_without};
 use std::path::Path;
 
 /// How many scenes of each end are shown.
 const SHOWN: usize = 3;
 /// Width of a picture, pixels.
 const WIDTH: u32 = 360;
+
+/// What a set holds that no view shows, and how well a map can be that lacks it.
+pub fn without_hidden(results: &Results, set: usize, catalog: &Catalog) -> Result<String> {
+    let scenes = &results.plan.sets[set].scenes;
+    let (mut hidden, mut iou, mut miou) = (Vec::new(), Vec::new(), Vec::new());
+    for (at, plan) in scenes.iter().enumerate() {
+        let cells = results.policies(set).into_iter().map(|(_, _, cell)| cell);
+        let Some(finished) = cells.filter_map(|cell| cell.scenes.get(&at)?.first()).next() else { continue };
+        let missing: Vec<ObjectId> = finished.result.hidden.iter().copied().map(ObjectId).collect();
+        let scores = scores_without(&plan.scene.grid(), &plan.scene.bodies(catalog)?, &missing);
+        hidden.push(missing.len() as f64);
+        iou.push(Metric::OccupancyIou.of(&scores));
+        miou.push(Metric::SemanticMiou.of(&scores));
+    }
+    Ok(format!(
+        "<p>At the start no view shows {:.1} objects of a scene. A perfect map that lacks them has occupancy IoU {:.3} and \
+         semantic mIoU {:.3} (means over {} scenes): who does not push reaches no more.</p>\n",
+        mean(&hidden),
+        mean(&iou),
+        mean(&miou),
+        hidden.len()
+    ))
+}
 
 /// The worst and the best scenes of a set for the reference policy. `bench_from_page` leads from the page to the bench's
 /// directory.
@@ -30,14 +55,14 @@ pub fn extremes(results: &Results, set: usize, catalog: &Catalog, bench_from_pag
     let parts = [("Worst", &order[..worst]), ("Best", &order[order.len() - best..])];
     for (title, scenes) in parts.into_iter().filter(|(_, scenes)| !scenes.is_empty()) {
         html += &format!("<h3>{title} scenes for {policy}, by semantic mIoU at the end</h3>\n<div class=\"cards\">\n");
-        for (scene, mean) in scenes {
+        for (scene, miou) in scenes {
             let plan = &results.plan.sets[set].scenes[*scene];
             let picture = picture::thumbnail(&plan.scene, catalog, View::Above, WIDTH)?;
             let size = [picture.width() as f32, picture.height() as f32];
             let mut svg = Svg::new(size);
             svg.raster([0.0, 0.0], size, &picture, RasterStyle::Smooth);
             html += &format!(
-                "<section class=\"card\">{}<h4>{}</h4><p>{}</p><p>mIoU {mean:.3}</p><ul>",
+                "<section class=\"card\">{}<h4>{}</h4><p>{}</p><p>mIoU {miou:.3}</p><ul>",
                 svg.document(),
                 escape(&plan.id),
                 escape(&plan.scene.description)
@@ -65,18 +90,19 @@ fn way_back(results: &Results, finished: &Finished, file: &str, bench_from_page:
             link(crate::driver::RECORDING)
         );
     }
-    let result = &finished.result;
-    let views = match results.plan.views.as_str() {
+    let (result, plan) = (&finished.result, &results.plan);
+    let views = match plan.views.as_str() {
         "standard300" => String::new(),
         other => format!(" --views {other}"),
     };
     format!(
-        "<code>nudge run {} --policy {} --belief {} --seed {} --budget {}{}</code>",
+        "<code>nudge run {} --policy {} --belief {} --seed {} --budget {}{}{}</code>",
         escape(file),
         result.policy,
         escape(&result.belief),
         result.seed,
         result.budget,
-        escape(&views)
+        escape(&views),
+        planner_args::to_type(&plan.planner, &result.belief)
     )
 }

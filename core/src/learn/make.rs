@@ -3,50 +3,23 @@
 use super::shard::{self, Frame};
 use super::{Card, Recipe, Sample};
 use crate::files::remove_if_there;
+use crate::shard::Shard;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Which part of a directory's shards one process makes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Job {
-    /// This process, from 0.
-    pub index: usize,
-    /// All processes.
-    pub of: usize,
-}
-
-impl Default for Job {
-    fn default() -> Self {
-        Self { index: 0, of: 1 }
-    }
-}
-
-impl std::str::FromStr for Job {
-    type Err = Error;
-
-    /// `i/n`, `i` from 0.
-    fn from_str(text: &str) -> Result<Self> {
-        let parts = text.split_once('/').and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)));
-        match parts {
-            Some((index, of)) if index < of => Ok(Self { index, of }),
-            _ => Err(Error::Usage(format!("shard \"{text}\": write i/n with i from 0 to n - 1, for example 0/4"))),
-        }
-    }
-}
-
 /// How far the making is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Samples of this job that are on disk or made.
+    /// Samples of this process that are on disk or made.
     pub done: usize,
     /// Samples that this call has made.
     pub made: usize,
-    /// Samples of this job.
+    /// Samples of this process.
     pub of: usize,
 }
 
-/// Makes the samples of `card` that are not there yet in `directory`, as far as they are this job's. A directory that was
+/// Makes the samples of `card` that are not there yet in `directory`, as far as their files are among `mine`. A directory that was
 /// begun is gone on with; a larger count extends it.
 ///
 /// `progress` is told after every sample, from any thread.
@@ -57,7 +30,7 @@ pub fn make<S: Sample>(
     card: &Card,
     recipe: &Recipe,
     directory: &Path,
-    job: Job,
+    mine: Shard,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Progress> {
     if card.kind != S::KIND {
@@ -73,7 +46,7 @@ pub fn make<S: Sample>(
         }
         None => card.write(directory)?,
     }
-    let shards: Vec<usize> = (0..card.shard_count()).filter(|shard| shard % job.of == job.index).collect();
+    let shards: Vec<usize> = (0..card.shard_count()).filter(|&file| mine.has(file)).collect();
     let of = shards.iter().map(|&shard| card.shard_samples(shard).len()).sum();
     let missing: Vec<usize> = shards.into_iter().filter(|&shard| !is_complete(card, directory, shard)).collect();
     let to_make: usize = missing.iter().map(|&shard| card.shard_samples(shard).len()).sum();

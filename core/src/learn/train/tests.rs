@@ -2,8 +2,9 @@ use super::*;
 use crate::belief::Classical;
 use crate::camera::ViewArray;
 use crate::cnabu::Cnabu;
-use crate::learn::{Card as DataCard, Dataset, Job, Kind as DataKind, MapSample, PushSample, Recipe, evaluate, make};
+use crate::learn::{Card as DataCard, Dataset, Kind as DataKind, MapSample, PushSample, Recipe, evaluate, make};
 use crate::scene::{Catalog, GenerateConfig};
+use crate::shard::Shard;
 use std::path::Path;
 
 fn recipe() -> Recipe {
@@ -21,7 +22,7 @@ fn data(count: usize) -> (tempfile::TempDir, Dataset<MapSample>) {
     let recipe = recipe();
     let directory = tempfile::tempdir().expect("a temporary directory");
     let card = DataCard::new(DataKind::Maps, &recipe, 5, count);
-    make::<MapSample>(&card, &recipe, directory.path(), Job::default(), &|_| ()).expect("made");
+    make::<MapSample>(&card, &recipe, directory.path(), Shard::default(), &|_| ()).expect("made");
     let data = Dataset::open(directory.path()).expect("opened");
     (directory, data)
 }
@@ -30,7 +31,7 @@ fn data(count: usize) -> (tempfile::TempDir, Dataset<MapSample>) {
 fn pushes(count: usize) -> (tempfile::TempDir, Dataset<PushSample>) {
     let directory = tempfile::tempdir().expect("a temporary directory");
     let card = DataCard::new(DataKind::Pushes, &recipe(), 6, count);
-    make::<PushSample>(&card, &recipe(), directory.path(), Job::default(), &|_| ()).expect("made");
+    make::<PushSample>(&card, &recipe(), directory.path(), Shard::default(), &|_| ()).expect("made");
     let data = Dataset::open(directory.path()).expect("opened");
     (directory, data)
 }

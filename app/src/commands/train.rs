@@ -5,6 +5,8 @@ mod curve;
 #[cfg(feature = "cnabu")]
 mod export;
 #[cfg(feature = "cnabu")]
+mod lineage;
+#[cfg(feature = "cnabu")]
 mod observe;
 #[cfg(feature = "cnabu")]
 mod push;

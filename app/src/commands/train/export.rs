@@ -1,7 +1,7 @@
 //! `nudge train export`: a checkpoint becomes weights with a card.
 
 use super::session::is_weights;
-use super::{ExportArgs, Network};
+use super::{ExportArgs, Network, lineage};
 use crate::commands::{calibrate, print};
 use nudge_core::Error;
 use nudge_core::belief::Classical;
@@ -10,6 +10,7 @@ use nudge_core::learn::{
     Dataset, MapSample, ObserveTrainer, PushSample, PushTrainer, Sample, TrainSettings, evaluate, evaluate_pushes,
     fit_change_temperature,
 };
+use nudge_core::scene::GenerateConfig;
 use nudge_core::score::Scores;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -111,13 +112,22 @@ fn describe<S: Sample>(
     }
     card.training = strings(settings)?;
     card.training.insert(UPDATES.into(), updates.to_string());
-    Ok(())
+    Ok(lineage::tell(&args.run, card)?)
 }
 
 /// The command that makes the samples of a directory.
 fn command<S: Sample>(data: &Dataset<S>) -> String {
-    let card = data.card();
-    format!("nudge data {} --seed {} --count {} --noise {}", S::KIND, card.seed, data.len(), card.noise_share)
+    let (card, usual) = (data.card(), GenerateConfig::default());
+    let mut command =
+        format!("nudge data {} --seed {} --count {} --noise {}", S::KIND, card.seed, data.len(), card.noise_share);
+    if card.fill != usual.fill {
+        let [low, high] = card.fill;
+        command += &format!(" --fill {low}-{high}");
+    }
+    if card.rho != usual.rho {
+        command += &format!(" --rho {}", card.rho);
+    }
+    command
 }
 
 /// Settings as the card's words.

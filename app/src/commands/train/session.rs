@@ -1,7 +1,7 @@
 //! What a training run does beside training: it reports, keeps checkpoints, validates, and knows when to stop.
 
-use super::SessionArgs;
 use super::curve::Curve;
+use super::{SessionArgs, lineage};
 use crate::commands::warn;
 use nudge_core::Error;
 use nudge_core::cnabu::{Device, Layout, Network, set_threads};
@@ -59,11 +59,14 @@ impl SessionArgs {
         if there.exists() && !self.force {
             return Err(Error::input(there, "", "is there already; --resume goes on with it, --force replaces it"));
         }
-        match self.from.as_deref() {
-            None => Trainer::new(settings, layout, device),
-            Some(weights) if is_weights(weights) => Trainer::begin_with(weights, settings, layout, device),
-            Some(run) => Trainer::load(run, settings, layout, device),
-        }
+        let weights = self.from.as_deref().filter(|from| is_weights(from));
+        let trainer = match (weights, self.from.as_deref()) {
+            (Some(weights), _) => Trainer::begin_with(weights, settings, layout, device)?,
+            (None, Some(run)) => Trainer::load(run, settings, layout, device)?,
+            (None, None) => Trainer::new(settings, layout, device)?,
+        };
+        lineage::keep(&self.out, weights, N::NAME)?;
+        Ok(trainer)
     }
 
     /// The training data, and the validation data if there is some.

@@ -38,7 +38,7 @@ impl ObserveTrainer {
     /// cooldown takes it to 0). Gives the losses per view.
     ///
     /// # Errors
-    /// When a sample cannot be read, and [`Error::Check`] when the loss is no longer finite.
+    /// When a sample cannot be read, and [`crate::Error::Check`] when the loss is no longer finite.
     pub fn train(
         &mut self,
         data: &Dataset<MapSample>,

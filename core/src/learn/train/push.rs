@@ -53,7 +53,7 @@ impl PushTrainer {
     /// Trains on the pushes of the next scenes, one update; `rate` scales the step size.
     ///
     /// # Errors
-    /// When a sample cannot be read, and [`Error::Check`] when the loss is no longer finite.
+    /// When a sample cannot be read, and [`crate::Error::Check`] when the loss is no longer finite.
     pub fn train(&mut self, data: &Dataset<PushSample>, priors: &mut Priors, rate: f64) -> Result<PushLoss> {
         let mut rng = stream(self.settings.seed, "push training batch", self.state.batches);
         let mut scenes = Vec::new();

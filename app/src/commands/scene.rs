@@ -145,7 +145,7 @@ struct Facts {
     fill: f32,
     /// Objects unseen from every view, as `class#id`.
     hidden: Vec<String>,
-    /// What a perfect map of all the others has: more than that no looking can reach.
+    /// What a perfect map of all the others has: what is beyond that has to be pushed free, or guessed.
     without_hidden: Scores,
 }
 

@@ -30,7 +30,7 @@ pub fn without_hidden(results: &Results, set: usize, catalog: &Catalog) -> Resul
     }
     Ok(format!(
         "<p>At the start no view shows {:.1} objects of a scene. A perfect map that lacks them has occupancy IoU {:.3} and \
-         semantic mIoU {:.3} (means over {} scenes): who does not push reaches no more.</p>\n",
+         semantic mIoU {:.3} (means over {} scenes): what is beyond that has to be pushed free, or guessed.</p>\n",
         mean(&hidden),
         mean(&iou),
         mean(&miou),

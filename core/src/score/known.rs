@@ -10,7 +10,7 @@ use crate::world::TruthMap;
 const KNOWN: f32 = 1e6;
 
 /// The scores of a map that is right and certain about everything but the `missing` objects, of which it knows nothing
-/// and takes their room for free: with the objects that no view shows, what looking alone can reach.
+/// and takes their room for free: with the objects that no view shows, what looking alone can reach without a guess.
 pub fn scores_without(grid: &Grid, bodies: &[Body], missing: &[ObjectId]) -> Scores {
     let shown: Vec<Body> = bodies.iter().filter(|body| !missing.contains(&body.id)).cloned().collect();
     Scores::of(&belief_in(grid, &TruthMap::of(grid, &shown)), &TruthMap::of(grid, bodies))

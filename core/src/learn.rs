@@ -23,7 +23,7 @@ pub use card::{Card, Kind, NAME as CARD_NAME};
 pub use dataset::Dataset;
 pub use evaluate::{PushTallies, evaluate, evaluate_after_pushes, evaluate_pushes, fit_change_temperature};
 pub use make::{Progress, make};
-pub use maps::{MapSample, Recipe, ViewSample};
+pub use maps::{MapSample, Recipe, Stretch, ViewSample};
 pub use pushes::{PUSHES, PushSample, PushedSample, VIEWS_AFTER};
 pub use shard::SAMPLES_PER_SHARD;
 #[cfg(feature = "cnabu")]

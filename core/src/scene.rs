@@ -26,7 +26,7 @@ pub use generate::{GenerateConfig, generate};
 pub(crate) use mesh::read_mesh_points;
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
-pub use rescale::rescale;
+pub use rescale::{rescale, rescale_if_room};
 pub use robot::{RobotFile, RobotPlacement};
 pub use shape::Shape;
 

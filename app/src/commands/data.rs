@@ -4,7 +4,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::arm::ArmTool;
 use nudge_core::camera::ViewArray;
-use nudge_core::learn::{Card, Dataset, Kind, MapSample, Progress, PushSample, Recipe, Sample, make};
+use nudge_core::learn::{Card, Dataset, Kind, MapSample, Progress, PushSample, Recipe, Sample, Stretch, make};
 use nudge_core::scene::{Catalog, GenerateConfig};
 use nudge_core::shard::Shard;
 use std::io::IsTerminal;
@@ -53,6 +53,12 @@ struct MakeArgs {
     /// Regularity: 0 places freely, 1 lines objects up behind each other
     #[arg(long, default_value_t = 0.0)]
     rho: f32,
+    /// Share of scenes whose objects are stretched, each along each axis by a factor of its own
+    #[arg(long, default_value_t = 0.0, value_name = "SHARE")]
+    stretch_share: f32,
+    /// Smallest and largest of these factors
+    #[arg(long, default_value = "0.8-1.2", value_name = "LOW-HIGH", value_parser = super::scene::parse_scale)]
+    stretch: super::scene::Scale,
     /// The view array that views are drawn from
     #[arg(long, default_value = "standard300")]
     views: String,
@@ -76,8 +82,10 @@ fn make_data<S: Sample>(args: &MakeArgs, kind: Kind) -> anyhow::Result<()> {
     if args.count == 0 {
         return Err(Error::Usage("--count must be at least 1".to_owned()).into());
     }
-    if !(0.0..=1.0).contains(&args.noise) {
-        return Err(Error::Usage(format!("--noise {}: must be a share between 0 and 1", args.noise)).into());
+    for (name, share) in [("noise", args.noise), ("stretch-share", args.stretch_share)] {
+        if !(0.0..=1.0).contains(&share) {
+            return Err(Error::Usage(format!("--{name} {share}: must be a share between 0 and 1")).into());
+        }
     }
     let scenes = GenerateConfig { fill: args.fill.0, rho: args.rho, ..GenerateConfig::default() };
     let arm = Arc::new(ArmTool::standard(scenes.shelf));
@@ -87,6 +95,7 @@ fn make_data<S: Sample>(args: &MakeArgs, kind: Kind) -> anyhow::Result<()> {
         arm,
         views: ViewArray::named(&args.views)?,
         noise_share: args.noise,
+        stretch: Stretch { share: args.stretch_share, range: args.stretch.0 },
     };
     let card = Card::new(kind, &recipe, args.seed, args.count);
     let started = Instant::now();

@@ -16,6 +16,7 @@ mod rescale;
 mod thumbnail;
 
 pub(super) use generate::{Fill, parse_fill};
+pub(super) use rescale::{Scale, parse_scale};
 
 /// Make, check, generate, rescale and draw scene files.
 #[derive(clap::Args, Debug)]

@@ -1,6 +1,6 @@
 //! The card of a data directory: everything that its samples follow from.
 
-use super::{Recipe, SAMPLES_PER_SHARD, VIEWS};
+use super::{Recipe, SAMPLES_PER_SHARD, Stretch, VIEWS};
 use crate::files::write_atomically;
 use crate::grid::Grid;
 use crate::{Error, Result};
@@ -66,6 +66,9 @@ pub struct Card {
     /// The arm that carried out the pushes; maps have `none`.
     #[serde(default = "no_pusher")]
     pub pusher: String,
+    /// Which samples have objects in other sizes.
+    #[serde(default)]
+    pub stretch: Stretch,
 }
 
 fn no_pusher() -> String {
@@ -96,6 +99,7 @@ impl Card {
                 Kind::Maps => no_pusher(),
                 Kind::Pushes => recipe.arm.arm.name.clone(),
             },
+            stretch: recipe.stretch,
         }
     }
 
@@ -167,6 +171,7 @@ impl Card {
                 ("fill", format!("{:?}", card.fill)),
                 ("rho", card.rho.to_string()),
                 ("noise", card.noise_share.to_string()),
+                ("stretch", format!("{:?} of {}", card.stretch.range, card.stretch.share)),
                 ("pushes by", card.pusher.clone()),
                 ("samples_per_shard", card.samples_per_shard.to_string()),
             ]

@@ -6,11 +6,12 @@ use crate::arm::ArmTool;
 use crate::camera::{MapObservation, NoiseModel, ViewArray, ViewId, project};
 use crate::grid::{Grid, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
-use crate::scene::{Body, Catalog, GenerateConfig, Shelf, generate};
+use crate::scene::{Body, Catalog, GenerateConfig, Scene, Shelf, generate, rescale_if_room};
 use crate::world::{TruthMap, World};
 use crate::{Error, Result};
 use rand::Rng;
 use rand::seq::index;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// What samples are made of, beside their seeds.
@@ -26,6 +27,25 @@ pub struct Recipe {
     pub arm: Arc<ArmTool>,
     /// Share of samples that are observed with [`NoiseModel::STANDARD`]; the others are without noise.
     pub noise_share: f32,
+    /// Which samples have objects in other sizes than the catalogue's.
+    pub stretch: Stretch,
+}
+
+/// Which samples have every object stretched, along each axis by a factor of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stretch {
+    /// Share of such samples.
+    pub share: f32,
+    /// Range of the factors.
+    pub range: [f32; 2],
+}
+
+impl Default for Stretch {
+    /// None.
+    fn default() -> Self {
+        Self { share: 0.0, range: [0.8, 1.2] }
+    }
 }
 
 impl Recipe {
@@ -34,9 +54,18 @@ impl Recipe {
         self.scenes.shelf.grid()
     }
 
+    /// The scene of a sample, before it settles. One that is too full for its objects' stretches keeps their usual sizes.
+    fn scene(&self, seed: u64) -> Result<Scene> {
+        let scene = generate(&self.catalog, &self.scenes, seed)?;
+        if stream(seed, "sample stretch", 0).random::<f32>() >= self.stretch.share {
+            return Ok(scene);
+        }
+        Ok(rescale_if_room(&scene, &self.catalog, self.stretch.range, seed)?.unwrap_or(scene))
+    }
+
     /// The settled world of a sample.
     pub(super) fn world(&self, seed: u64) -> Result<World> {
-        let scene = generate(&self.catalog, &self.scenes, seed)?;
+        let scene = self.scene(seed)?;
         let mut world = World::new(scene.shelf, scene.bodies(&self.catalog)?);
         world.settle();
         Ok(world)
@@ -142,5 +171,48 @@ impl Sample for MapSample {
         let (labels, truth) = (reader.floor()?, reader.set()?);
         let views = take_views(&mut reader, &ids)?;
         reader.is_done().then_some(Self { seed, truth, labels, views })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recipe(stretch: Stretch) -> Recipe {
+        let scenes = GenerateConfig { fill: [0.2, 0.2], ..GenerateConfig::default() };
+        Recipe {
+            catalog: Catalog::standard(),
+            arm: Arc::new(ArmTool::standard(scenes.shelf)),
+            scenes,
+            views: ViewArray::named("standard300").expect("shipped"),
+            noise_share: 0.0,
+            stretch,
+        }
+    }
+
+    #[test]
+    fn a_share_of_the_samples_has_objects_in_other_sizes() {
+        let [none, some] = [0.0, 0.4].map(|share| recipe(Stretch { share, range: [0.9, 1.1] }));
+        let is_stretched = |seed: &u64| {
+            let (usual, scene) = (none.scene(*seed).expect("a scene"), some.scene(*seed).expect("a scene"));
+            assert!(usual.objects.iter().all(|object| object.scale == [1.0; 3]));
+            let factors = || scene.objects.iter().flat_map(|object| object.scale);
+            assert!(factors().all(|factor| (0.8999..=1.1001).contains(&factor)));
+            // All of its objects, or it is the usual scene.
+            let stretched = factors().filter(|factor| *factor != 1.0).count();
+            assert!(scene == usual || stretched > 2 * scene.objects.len());
+            scene != usual
+        };
+        let count = (0..60).filter(is_stretched).count();
+        assert!((12..=36).contains(&count), "{count} of 60 at a share of 0.4");
+    }
+
+    #[test]
+    fn a_scene_without_room_for_its_stretches_keeps_its_sizes() {
+        let recipe = Recipe {
+            scenes: GenerateConfig { fill: [0.5, 0.5], ..GenerateConfig::default() },
+            ..recipe(Stretch { share: 1.0, range: [2.0, 2.0] })
+        };
+        assert!(recipe.scene(1).expect("a scene").objects.iter().all(|object| object.scale == [1.0; 3]));
     }
 }

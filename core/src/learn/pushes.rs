@@ -214,6 +214,7 @@ impl Sample for PushSample {
 mod tests {
     use super::*;
     use crate::camera::ViewArray;
+    use crate::learn::Stretch;
     use crate::scene::{Catalog, GenerateConfig};
     use std::sync::Arc;
 
@@ -226,6 +227,7 @@ mod tests {
             scenes,
             views: ViewArray::named("standard300").expect("shipped"),
             noise_share: 0.0,
+            stretch: Stretch::default(),
         };
         let sample = PushSample::simulate(&recipe, 3).expect("simulated");
         assert!(!sample.pushes.is_empty() && sample.after.len() == VIEWS_AFTER);

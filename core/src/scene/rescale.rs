@@ -26,6 +26,15 @@ const STUCK_M: f32 = 0.4 * CONTACT_DEPTH_M;
 /// [`Error::Usage`] for a range that is none, and for a scene so full that no draw has room; what [`Scene::check`] says
 /// of the result.
 pub fn rescale(scene: &Scene, catalog: &Catalog, range: [f32; 2], seed: u64) -> Result<Scene> {
+    let no_room = || Error::Usage(format!("scene {}: no draw of {DRAWS} leaves room for every object", scene.name));
+    rescale_if_room(scene, catalog, range, seed)?.ok_or_else(no_room)
+}
+
+/// [`rescale`], or `None` for a scene so full that no draw has room.
+///
+/// # Errors
+/// [`Error::Usage`] for a range that is none; what [`Scene::check`] says of the result.
+pub fn rescale_if_room(scene: &Scene, catalog: &Catalog, range: [f32; 2], seed: u64) -> Result<Option<Scene>> {
     let [low, high] = range;
     if !(low > 0.0 && low <= high && high.is_finite()) {
         return Err(Error::Usage(format!("scale {low} to {high}: must be a rising range of factors above 0")));
@@ -40,14 +49,14 @@ pub fn rescale(scene: &Scene, catalog: &Catalog, range: [f32; 2], seed: u64) -> 
         let stuck = move_apart(&mut stretched, catalog)?;
         if stuck.is_empty() && stretched.problems(catalog)?.is_empty() {
             stretched.check(catalog)?;
-            return Ok(stretched);
+            return Ok(Some(stretched));
         }
         let redrawn = if stuck.is_empty() { (0..factors.len()).collect() } else { stuck };
         for at in redrawn {
             factors[at] = draw(range, &mut rng);
         }
     }
-    Err(Error::Usage(format!("scene {}: no draw of {DRAWS} leaves room for every object", scene.name)))
+    Ok(None)
 }
 
 fn draw([low, high]: [f32; 2], rng: &mut ChaCha8Rng) -> [f32; 3] {

@@ -17,8 +17,8 @@ pub struct Args {
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Smallest and largest factor; each object draws one per axis
-    #[arg(long, default_value = "0.8-1.2", value_name = "LOW-HIGH", value_parser = parse_range)]
-    scale: Range,
+    #[arg(long, default_value = "0.8-1.2", value_name = "LOW-HIGH", value_parser = parse_scale)]
+    scale: Scale,
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -33,13 +33,20 @@ pub struct Args {
     json: bool,
 }
 
+/// A range of factors of an object's size.
 #[derive(Clone, Copy, Debug)]
-struct Range([f32; 2]);
+pub(in crate::commands) struct Scale(pub(in crate::commands) [f32; 2]);
 
-fn parse_range(text: &str) -> Result<Range, String> {
+/// A range, `0.8-1.2`.
+pub(in crate::commands) fn parse_scale(text: &str) -> Result<Scale, String> {
     let number = |text: &str| text.trim().parse::<f32>().map_err(|_| format!("`{text}` is not a number"));
     let (low, high) = text.split_once('-').ok_or("a range is two numbers, such as 0.8-1.2")?;
-    Ok(Range([number(low)?, number(high)?]))
+    let (low, high) = (number(low)?, number(high)?);
+    if low > 0.0 && low <= high && high.is_finite() {
+        Ok(Scale([low, high]))
+    } else {
+        Err("the range must rise, above 0".to_owned())
+    }
 }
 
 /// What `nudge scene rescale --json` tells of a scene.

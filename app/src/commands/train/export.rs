@@ -7,8 +7,8 @@ use nudge_core::Error;
 use nudge_core::belief::Classical;
 use nudge_core::cnabu::{Card, Cnabu, Layout, OBSERVE_WEIGHTS, PUSH_WEIGHTS, Tensor, UPDATES, half, write_tensors};
 use nudge_core::learn::{
-    Dataset, MapSample, ObserveTrainer, PushSample, PushTrainer, Sample, TrainSettings, evaluate, evaluate_pushes,
-    fit_change_temperature,
+    Dataset, MapSample, ObserveTrainer, PushSample, PushTrainer, Sample, Stretch, TrainSettings, evaluate,
+    evaluate_pushes, fit_change_temperature,
 };
 use nudge_core::scene::GenerateConfig;
 use nudge_core::score::Scores;
@@ -126,6 +126,10 @@ fn command<S: Sample>(data: &Dataset<S>) -> String {
     }
     if card.rho != usual.rho {
         command += &format!(" --rho {}", card.rho);
+    }
+    if card.stretch.share > 0.0 {
+        let Stretch { share, range: [low, high] } = card.stretch;
+        command += &format!(" --stretch {low}-{high} --stretch-share {share}");
     }
     command
 }

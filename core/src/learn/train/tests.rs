@@ -2,7 +2,9 @@ use super::*;
 use crate::belief::Classical;
 use crate::camera::ViewArray;
 use crate::cnabu::Cnabu;
-use crate::learn::{Card as DataCard, Dataset, Kind as DataKind, MapSample, PushSample, Recipe, evaluate, make};
+use crate::learn::{
+    Card as DataCard, Dataset, Kind as DataKind, MapSample, PushSample, Recipe, Stretch, evaluate, make,
+};
 use crate::scene::{Catalog, GenerateConfig};
 use crate::shard::Shard;
 use std::path::Path;
@@ -14,6 +16,7 @@ fn recipe() -> Recipe {
         arm: std::sync::Arc::new(crate::arm::ArmTool::standard(GenerateConfig::default().shelf)),
         views: ViewArray::named("standard300").expect("shipped"),
         noise_share: 0.0,
+        stretch: Stretch::default(),
     }
 }
 

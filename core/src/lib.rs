@@ -19,6 +19,7 @@ pub mod files;
 pub mod gain;
 pub mod grid;
 pub mod learn;
+mod named;
 pub mod plan;
 pub mod push;
 pub mod rng;

@@ -20,6 +20,7 @@ use crate::belief::{Belief, BeliefUpdate, CERTAIN, CNABU, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
 use crate::gain::GainField;
 use crate::grid::VoxelSet;
+use crate::named;
 use crate::push::{PushSampler, Rejection};
 use serde::{Deserialize, Serialize};
 
@@ -253,10 +254,7 @@ impl std::str::FromStr for Counted {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL
-            .into_iter()
-            .find(|counted| counted.to_string() == text)
-            .ok_or_else(|| "there are all and unseen".to_owned())
+        named::parse(&Self::ALL, text)
     }
 }
 

@@ -21,6 +21,7 @@ pub use frontier::frontier;
 use crate::arm::{ArmTool, Hit, Obstacle, Push, PushMotion, level_tool};
 use crate::belief::{Belief, SweptPush};
 use crate::grid::{Grid, Voxel, VoxelSet};
+use crate::named;
 use crate::rng::{ChaCha8Rng, stream};
 use frontier::{Frontier, start_of};
 use hidden::Contacts;
@@ -178,8 +179,7 @@ impl std::str::FromStr for PushSampler {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let named = Self::ALL.into_iter().find(|sampler| sampler.to_string() == text);
-        named.ok_or_else(|| "there are frontier and hidden".to_owned())
+        named::parse(&Self::ALL, text)
     }
 }
 

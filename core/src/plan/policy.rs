@@ -1,6 +1,7 @@
 //! The policies by name, and what each of them stands for.
 
 use crate::belief::{CLASSICAL, CNABU};
+use crate::named;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -91,10 +92,7 @@ impl FromStr for PolicyKind {
     type Err = Error;
 
     fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|policy| policy.name() == name).ok_or_else(|| {
-            let known: Vec<&str> = Self::ALL.iter().map(|policy| policy.name()).collect();
-            Error::Usage(format!("unknown policy \"{name}\"; there are {}", known.join(", ")))
-        })
+        named::parse(&Self::ALL, name).map_err(|known| Error::Usage(format!("unknown policy \"{name}\"; {known}")))
     }
 }
 

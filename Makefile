@@ -11,7 +11,7 @@ WINDOW := --features nudge-tests/workbench
 NETWORKS := -p nudge-core -p nudge --features nudge/cnabu
 DATA := $(CURDIR)/out/data
 
-.PHONY: help setup graphics python demo workbench workbench-cnabu cnabu train train-push test test-cnabu test-headless regress bench bench-window lint lint-cnabu
+.PHONY: help setup graphics python demo workbench workbench-cnabu cnabu train train-push test test-cnabu test-headless regress bench bench-cnabu bench-window lint lint-cnabu
 help:
 	@echo 'make demo        map a crowded shelf: prints the table, writes out/demo/'
 	@echo 'make workbench   build and open the window (the first build takes about 45 minutes on two cores)'
@@ -23,6 +23,7 @@ help:
 	@echo 'make test-headless  the tests that need no window'
 	@echo 'make regress     the scores of a small fixed bench against golden ones'
 	@echo 'make bench       the speed of the parts that matter, beside their targets'
+	@echo 'make bench-cnabu the speed of the neural belief updates, beside their targets'
 	@echo 'make bench-window what the window costs: frames, latency, memory'
 	@echo 'make lint        formatting, clippy and documentation without warnings'
 
@@ -85,6 +86,9 @@ regress: setup
 bench: setup
 	cargo build --release --locked --workspace
 	cargo bench --locked --workspace --bench gain --bench arm --bench speed
+
+bench-cnabu: setup
+	LIBTORCH="$$(scripts/libtorch.sh)" cargo bench --locked $(NETWORKS) --bench networks
 
 bench-window: graphics
 	cargo build --release --locked --workspace $(WINDOW)

@@ -25,6 +25,8 @@ mod update;
 mod weights;
 
 #[cfg(feature = "cnabu")]
+pub(crate) use layout::SUBS;
+#[cfg(feature = "cnabu")]
 pub use layout::{LEVELS, Layout, Mirror};
 #[cfg(feature = "cnabu")]
 pub use loss::{LossForm, expected_log_loss, kl_to_uniform, marginal_log_loss, occupancy_loss, semantics_loss};

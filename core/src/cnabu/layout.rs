@@ -26,7 +26,7 @@ const VOXEL_M: f32 = 0.005;
 /// Floor cells in a pixel, along x and along y.
 const FOLD: usize = 2;
 /// Sub-cells of a pixel.
-pub(super) const SUBS: usize = FOLD * FOLD;
+pub(crate) const SUBS: usize = FOLD * FOLD;
 /// The U-Net halves its planes so often that they must be multiples of this.
 const PIXEL_MULTIPLE: usize = 8;
 /// Channels of one occupancy quantity: a value per level and sub-cell.
@@ -239,29 +239,29 @@ impl Layout {
     /// The logarithms of a belief's evidence: occupied, then free levels (2 x [`OCCUPANCY`] planes), and classes
     /// ([`SEMANTICS`] planes). The evidence of a level is the mean of its voxels'.
     pub(crate) fn put_belief(&self, belief: &Belief, occupancy: &mut [f32], semantics: &mut [f32]) {
-        let (plane, depth, height) = (self.plane(), self.grid.dims[1], self.grid.dims[2]);
-        // Channel by channel, so that threads write apart from each other.
-        occupancy.par_chunks_mut(SUBS * plane).enumerate().for_each(|(channel, out)| {
-            let (side, level) = (channel / LEVELS, channel % LEVELS);
-            let voxels = (level * VOXELS_PER_LEVEL).min(height)..((level + 1) * VOXELS_PER_LEVEL).min(height);
-            let share = 1.0 / voxels.len().max(1) as f32;
-            let mut last = (f32::NAN, 0.0);
-            for cell in 0..self.grid.cell_count() {
-                let column = &belief.occupancy[cell * height..(cell + 1) * height];
-                let mean = column[voxels.clone()].iter().map(|a| a[side]).sum::<f32>() * share;
-                // Neighbours often share their evidence: one logarithm for all of them.
-                if mean != last.0 {
-                    last = (mean, if voxels.is_empty() { 0.0 } else { mean.max(1.0).ln() });
+        let (plane, height) = (self.plane(), self.grid.dims[2]);
+        // Level by level, so that threads write apart from each other, both sides of it at once: they lie side by side.
+        let (occupied, free) = occupancy.split_at_mut(OCCUPANCY * plane);
+        occupied.par_chunks_mut(SUBS * plane).zip(free.par_chunks_mut(SUBS * plane)).enumerate().for_each(
+            |(level, (occupied, free))| {
+                let voxels = (level * VOXELS_PER_LEVEL).min(height)..((level + 1) * VOXELS_PER_LEVEL).min(height);
+                let share = 1.0 / voxels.len().max(1) as f32;
+                let mut last = ([f32::NAN; 2], [0.0; 2]);
+                for (cell, sub, pixel) in self.cells(Mirror::No, self.whole()) {
+                    let column = &belief.occupancy[cell * height..(cell + 1) * height];
+                    let sum = column[voxels.clone()].iter().fold([0.0; 2], |sum, a| [sum[0] + a[0], sum[1] + a[1]]);
+                    // Neighbours often share their evidence: one logarithm for all of them.
+                    if sum != last.0 {
+                        last = (sum, sum.map(|sum| (sum * share).max(1.0).ln()));
+                    }
+                    occupied[sub * plane + pixel] = last.1[0];
+                    free[sub * plane + pixel] = last.1[1];
                 }
-                let (sub, pixel) = self.place(cell, Mirror::No);
-                out[sub * plane + pixel] = last.1;
-            }
-        });
+            },
+        );
         semantics.par_chunks_mut(SUBS * plane).enumerate().for_each(|(class, out)| {
-            for (cell, a) in belief.semantics.iter().enumerate() {
-                let at = [cell / depth, cell % depth];
-                let (sub, pixel) = (at[0] % FOLD * FOLD + at[1] % FOLD, at[0] / FOLD * self.pixels[1] + at[1] / FOLD);
-                out[sub * plane + pixel] = a[class].max(1.0).ln();
+            for (cell, sub, pixel) in self.cells(Mirror::No, self.whole()) {
+                out[sub * plane + pixel] = belief.semantics[cell][class].max(1.0).ln();
             }
         });
     }

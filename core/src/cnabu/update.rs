@@ -104,12 +104,19 @@ impl Cnabu {
     }
 
     /// sigma_o on planes: posterior evidence from prior evidence, levels observed and one-hot labels.
-    pub(crate) fn observe_planes(&self, prior: &Evidence, observed: &Tensor, labels: &Tensor) -> Evidence {
+    pub(crate) fn observe_planes(
+        &self,
+        layout: &Layout,
+        prior: &Evidence,
+        observed: &Tensor,
+        labels: &Tensor,
+    ) -> Evidence {
         let networks = self.networks();
         let device = networks.device();
+        let forward = if layout.is_padded() { ObserveNet::forward } else { ObserveNet::forward_both_ways };
         tch::no_grad(|| {
             let (occupancy, semantics) =
-                networks.observe.forward(prior, &observed.to_device(device), &labels.to_device(device));
+                forward(&networks.observe, prior, &observed.to_device(device), &labels.to_device(device));
             Evidence::of_heads(&occupancy, &semantics)
         })
     }
@@ -159,7 +166,7 @@ impl BeliefUpdate for Cnabu {
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief {
         let Ok(layout) = Layout::new(&belief.grid) else { return Classical.observe(belief, observation) };
         let (observed, labels) = observation_planes(&layout, observation, Mirror::No);
-        let evidence = self.observe_planes(&self.planes_of(&layout, belief), &observed, &labels);
+        let evidence = self.observe_planes(&layout, &self.planes_of(&layout, belief), &observed, &labels);
         belief_of(&layout, &evidence)
     }
 

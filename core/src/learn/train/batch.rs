@@ -2,16 +2,13 @@
 
 use super::moved::Moved;
 use crate::Result;
-use crate::cnabu::{Layout, Mirror};
+use crate::cnabu::{Layout, Mirror, SUBS};
 use crate::learn::{Dataset, MapSample};
 use crate::rng::ChaCha8Rng;
 use crate::scene::CLASS_COUNT;
 use rand::Rng;
 use rayon::prelude::*;
 use tch::Tensor;
-
-/// Sub-cells of a pixel.
-const SUBS: usize = 4;
 
 /// A few samples, some of them mirrored, some moved.
 pub(super) struct Batch<'a> {

@@ -9,8 +9,8 @@ use super::kept::Kept;
 use crate::Result;
 use crate::belief::{Carried, FloorPlan, SOLID};
 use crate::cnabu::{
-    Cnabu, Evidence, Layout, LossForm, Mirror, Numbers, PriorParts, PushNet, PushPlanes, Pushed, WINDOW, Windowed,
-    belief_of, observation_planes, occupancy_loss, push_planes, semantics_loss, windows,
+    Cnabu, Evidence, Layout, LossForm, Mirror, Numbers, PriorParts, PushNet, PushPlanes, Pushed, SUBS, WINDOW,
+    Windowed, belief_of, observation_planes, occupancy_loss, push_planes, semantics_loss, windows,
 };
 use crate::learn::{Dataset, PushSample, PushedSample};
 use crate::rng::stream;
@@ -20,8 +20,6 @@ use std::ops::Range;
 use std::sync::Arc;
 use tch::{Kind, Tensor};
 
-/// Sub-cells of a pixel.
-const SUBS: usize = 4;
 /// How much a floor cell that does not change counts beside one that does. Next to nothing: the posterior is gated with the
 /// probability of change, so what is wanted is the prediction given that the cell changes. (With 0.1 about half of
 /// the loss was of unchanged cells: the prediction was hedged towards them, and the gate hedged it once more.)
@@ -145,7 +143,7 @@ impl Prior {
         let mut evidence = Evidence::uniform(1, layout.pixels().map(|n| n as i64), observe.device());
         for view in &sample.views {
             let (observed, labels) = observation_planes(layout, &view.observation, Mirror::No);
-            evidence = observe.observe_planes(&evidence, &observed, &labels);
+            evidence = observe.observe_planes(layout, &evidence, &observed, &labels);
         }
         let evidence = evidence.to_kind(Kind::Half);
         let belief = belief_of(layout, &evidence.to_kind(Kind::Float));

@@ -1,6 +1,6 @@
 //! Lines over a common axis, with bands and names at their ends.
 
-use super::plot::nice_ticks;
+use super::plot::{counting_ticks, nice_ticks};
 use super::svg::{Anchor, HAIRLINE, SOFT_INK, Stroke, Svg, Text};
 use crate::colors::Rgb;
 
@@ -36,7 +36,8 @@ pub struct Chart {
     pub diagonal: bool,
 }
 
-const LEFT: f32 = 46.0;
+/// Room for numbers of six digits, also in a browser's wider type.
+const LEFT: f32 = 56.0;
 const TOP: f32 = 30.0;
 const BOTTOM: f32 = 36.0;
 /// Least distance of the baselines of two names.
@@ -61,7 +62,7 @@ impl Chart {
             svg.text(&text.anchored(Anchor::End).colored(SOFT_INK));
         }
         let floor = axes[1] + axes[3];
-        for (value, label) in nice_ticks(self.x_range, 8) {
+        for (value, label) in counting_ticks(self.x_range, 8) {
             svg.line([x(value), floor], [x(value), floor + 3.0], Stroke::new(SOFT_INK, 0.9));
             let text = Text::new(label, [x(value), floor + 15.0], 11.0);
             svg.text(&text.anchored(Anchor::Middle).colored(SOFT_INK));

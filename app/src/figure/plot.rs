@@ -110,14 +110,24 @@ pub fn push_mark(svg: &mut Svg, [x, y]: [f32; 2]) {
 }
 
 /// Round numbers in a range, about `count` of them, each with its label.
-pub fn nice_ticks([low, high]: [f64; 2], count: usize) -> Vec<(f64, String)> {
+pub fn nice_ticks(range: [f64; 2], count: usize) -> Vec<(f64, String)> {
+    ticks(range, count, &[1.0, 2.0, 2.5, 5.0, 10.0])
+}
+
+/// The same for what is counted: from 1 on they are whole numbers.
+pub fn counting_ticks(range: [f64; 2], count: usize) -> Vec<(f64, String)> {
+    ticks(range, count, &[1.0, 2.0, 5.0, 10.0])
+}
+
+/// Multiples of one of `steps`, or of its tenths, tens and so on.
+fn ticks([low, high]: [f64; 2], count: usize, steps: &[f64]) -> Vec<(f64, String)> {
     let span = high - low;
     if !(span > 0.0 && span.is_finite()) {
         return vec![(low, format!("{low}"))];
     }
     let rough = span / count as f64;
     let power = 10.0_f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 2.5, 5.0, 10.0].map(|k| k * power).into_iter().find(|s| *s >= rough * 0.999).unwrap_or(rough);
+    let step = steps.iter().map(|k| k * power).find(|s| *s >= rough * 0.999).unwrap_or(rough);
     let digits =
         (0..6).find(|d| ((step * 10.0_f64.powi(*d)).fract()).min(1.0 - (step * 10.0_f64.powi(*d)).fract()) < 1e-6);
     let digits = digits.unwrap_or(6) as usize;
@@ -138,5 +148,8 @@ mod tests {
         assert_eq!(labels([0.0, 513.0], 4), "0 200 400");
         assert_eq!(labels([0.0, 1.0], 6), "0.0 0.2 0.4 0.6 0.8 1.0");
         assert_eq!(nice_ticks([2.0, 2.0], 4).len(), 1);
+        assert_eq!(labels([1.0, 20.0], 8), "2.5 5.0 7.5 10.0 12.5 15.0 17.5 20.0");
+        let counted: Vec<String> = counting_ticks([1.0, 20.0], 8).into_iter().map(|t| t.1).collect();
+        assert_eq!(counted, ["5", "10", "15", "20"]);
     }
 }

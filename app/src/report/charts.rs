@@ -108,9 +108,13 @@ fn reliability(results: &Results, set: usize, what: &str, of: impl Fn(&Cell) -> 
     }
 }
 
-/// Accuracy against confidence over all classes together, bins without cells left out.
+/// A bin with fewer of all cells than one in so many is left out: its accuracy is that of a handful of cells.
+const CELLS_PER_RARE: u64 = 10_000;
+
+/// Accuracy against confidence over all classes together, bins with next to no cells left out.
 fn reliability_points(reliability: &Reliability) -> Vec<[f64; 2]> {
     let bins = reliability.bins.first().map_or(0, |bins| bins.len());
+    let all: u64 = reliability.bins.iter().flatten().map(|bin| bin.count).sum();
     (0..bins)
         .filter_map(|bin| {
             let mut sum = ReliabilityBin::default();
@@ -120,7 +124,7 @@ fn reliability_points(reliability: &Reliability) -> Vec<[f64; 2]> {
                 sum.confidence += class[bin].confidence;
             }
             let count = sum.count as f64;
-            (sum.count > 0).then(|| [sum.confidence / count, sum.correct as f64 / count])
+            (sum.count > all / CELLS_PER_RARE).then(|| [sum.confidence / count, sum.correct as f64 / count])
         })
         .collect()
 }

@@ -17,7 +17,10 @@ struct Table {
 
 impl Table {
     fn html(&self) -> String {
-        let mut html = format!("<div class=\"wide\"><table><caption>{}</caption><thead><tr>", self.caption);
+        let mut html = format!(
+            "<figure class=\"table\"><figcaption>{}</figcaption><div class=\"wide\"><table><thead><tr>",
+            self.caption
+        );
         for title in &self.titles {
             let _ = write!(html, "<th scope=\"col\">{title}</th>");
         }
@@ -30,7 +33,7 @@ impl Table {
             }
             html += "</tr>";
         }
-        html + "</tbody></table></div>\n"
+        html + "</tbody></table></div></figure>\n"
     }
 }
 

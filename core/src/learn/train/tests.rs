@@ -1,5 +1,5 @@
 use super::*;
-use crate::belief::Classical;
+use crate::belief::{BeliefUpdate, Classical};
 use crate::camera::ViewArray;
 use crate::cnabu::Cnabu;
 use crate::learn::{
@@ -169,25 +169,43 @@ fn a_run_begins_with_finished_weights() {
     assert!(error.contains("network: is sigma_o; this program needs sigma_m"), "{error}");
 }
 
+/// The shipped sigma_o learns four scenes by heart: one scene a batch for many small updates, and a step size that falls to
+/// nothing (cosine). Fresh weights are at 0.969 after 6,000 such updates, for which the whole test would take twice as long.
 #[test]
-#[ignore = "trains for several minutes; make test-cnabu runs it"]
+#[ignore = "trains for a quarter of an hour; make test-cnabu runs it"]
 fn a_network_overfits_four_scenes() {
+    const ROUNDS: usize = 170;
     let (_directory, data) = data(4);
-    let settings =
-        TrainSettings { batch: 4, learning_rate: 2e-3, kl_weight: 0.0, mean_decay: 0.9, ..TrainSettings::default() };
-    let mut trainer = trainer(settings, &data);
-    let mut iou = 0.0;
-    for round in 0..30 {
-        run(&mut trainer, &data, 10);
-        let tallies = evaluate(&data, &trainer.update(), &mut |_| ()).expect("evaluated");
-        iou = tallies[VIEWS - 1].scores().occupancy_iou;
-        println!("round {round}: IoU {iou:.4}");
-        if iou > 0.98 {
-            break;
+    let settings = TrainSettings {
+        batch: 1,
+        learning_rate: 1e-3,
+        max_views: VIEWS,
+        kl_weight: 0.0,
+        semantic_weight: 0.3,
+        mean_decay: 0.99,
+        ..TrainSettings::default()
+    };
+    tch::set_num_threads(1);
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../models").join(crate::cnabu::OBSERVE_WEIGHTS);
+    let layout = Layout::new(&data.grid()).expect("5 mm");
+    let mut trainer = ObserveTrainer::begin_with(&shipped, settings, layout, Device::Cpu).expect("begun");
+    let after_all = |update: &dyn BeliefUpdate| {
+        evaluate(&data, update, &mut |_| ()).expect("evaluated")[VIEWS - 1].scores().occupancy_iou
+    };
+    let (before, classical) = (after_all(&trainer.update()), after_all(&Classical));
+    assert!(before < 0.96 && classical < before, "{before} before, classical {classical}: nothing to learn");
+    let mut iou = before;
+    for round in 0..ROUNDS {
+        let rate = 0.5 * (1.0 + (std::f64::consts::PI * round as f64 / ROUNDS as f64).cos());
+        for _ in 0..10 {
+            trainer.train(&data, None, rate).expect("trained");
+        }
+        if round % 10 == 9 {
+            iou = after_all(&trainer.update());
+            println!("{} updates: IoU {iou:.4}", trainer.updates());
         }
     }
-    let classical = evaluate(&data, &Classical, &mut |_| ()).expect("evaluated")[VIEWS - 1].scores().occupancy_iou;
-    assert!(iou > 0.98 && iou > classical, "{iou}, classical {classical}");
+    assert!(iou > 0.98, "{iou}");
 }
 
 #[test]
@@ -200,10 +218,8 @@ fn weights_go_to_a_file_and_come_back_and_bad_ones_are_told() {
     crate::cnabu::write_tensors(&path, &weights).expect("written");
     card.write(&path).expect("written");
     let sample = data.get(0).expect("read");
-    let observed = |update: &Cnabu| {
-        use crate::belief::BeliefUpdate;
-        update.observe(&crate::belief::Belief::uniform(data.grid()), &sample.views[0].observation)
-    };
+    let observed =
+        |update: &Cnabu| update.observe(&crate::belief::Belief::uniform(data.grid()), &sample.views[0].observation);
     let loaded = Cnabu::load_file(&path).expect("loaded");
     assert_eq!(observed(&loaded), observed(&trainer.update()));
 

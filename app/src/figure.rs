@@ -10,7 +10,7 @@ mod plot;
 mod summary;
 mod svg;
 
-pub use calibration::{Calibrated, calibration};
+pub use calibration::{Calibrated, VIEWS, VIEWS_AFTER_PUSH, Views, calibration};
 pub use chart::{Chart, Series};
 pub use plot::{Curve, Plot, nice_ticks};
 pub use summary::{Moment, Summary, summary};

@@ -1,6 +1,6 @@
 //! `nudge calibrate`: how good and how well calibrated belief updates are on held-out scenes, against the number of views.
 
-use crate::figure::{Calibrated, PIXELS_PER_UNIT, calibration, escape};
+use crate::figure::{Calibrated, PIXELS_PER_UNIT, VIEWS, VIEWS_AFTER_PUSH, Views, calibration, escape};
 use crate::picture;
 use indicatif::ProgressBar;
 use nudge_core::Error;
@@ -80,8 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         pushes.truncate(args.scenes);
     }
     let mut results: Vec<(String, Vec<Tally>)> = Vec::new();
-    let mut predictions: Vec<(String, Scores)> = Vec::new();
-    let mut afterwards: Vec<(String, Vec<Tally>)> = Vec::new();
+    let mut pushed = Pushed::default();
     for name in &args.beliefs {
         let update: Arc<dyn BeliefUpdate> = match name.as_str() {
             CLASSICAL => Arc::new(Classical),
@@ -98,70 +97,134 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         results.push((name.clone(), tallies));
         if let Some(pushes) = &pushes {
             let tallies = evaluate_pushes(pushes, &*update, &*update, &mut |_| ())?;
-            predictions.push((name.clone(), tallies.predicted.scores()));
-            predictions.push((format!("{name}, as if nothing had changed"), tallies.unchanged.scores()));
-            afterwards.push((name.clone(), evaluate_after_pushes(pushes, &*update, &mut |_| ())?));
+            pushed.predictions.push((name.clone(), tallies.predicted.scores()));
+            pushed.predictions.push((format!("{name}, as if nothing had changed"), tallies.unchanged.scores()));
+            pushed.afterwards.push((name.clone(), evaluate_after_pushes(pushes, &*update, &mut |_| ())?));
         }
     }
-    let page = args.out.as_deref().map(|out| write_page(out, &args.data, data.len(), &results)).transpose()?;
+    let of_pushes = args
+        .pushes
+        .as_deref()
+        .zip(pushes.as_ref())
+        .map(|(directory, pushes)| Source { directory, scenes: pushes.len() });
+    let of_views = Source { directory: &args.data, scenes: data.len() };
+    let page = args.out.as_deref().map(|out| write_page(out, of_views, &results, of_pushes, &pushed)).transpose()?;
     if args.json {
-        let rows: Vec<_> = results
-            .iter()
-            .map(|(name, tallies)| serde_json::json!({ "belief": name, "scores": scored(1, tallies), "tallies": tallies }))
+        let rows = |first: usize, of: &[(String, Vec<Tally>)]| {
+            let row = |(name, tallies): &(String, Vec<Tally>)| serde_json::json!({ "belief": name, "scores": scored(first, tallies), "tallies": tallies });
+            of.iter().map(row).collect::<Vec<_>>()
+        };
+        let predictions: Vec<_> = (pushed.predictions.iter())
+            .map(|(name, scores)| serde_json::json!({ "prediction": name, "scores": scores }))
             .collect();
-        return super::print(&super::to_json(
-            &serde_json::json!({ "data": args.data, "scenes": data.len(), "results": rows }),
-        )?);
+        return super::print(&super::to_json(&serde_json::json!({
+            "data": args.data,
+            "scenes": data.len(),
+            "results": rows(1, &results),
+            "changed_cells": predictions,
+            "after_pushes": rows(0, &pushed.afterwards),
+        }))?);
     }
     super::print(&format!("{}: {} scenes\n", args.data.display(), data.len()))?;
     for (name, tallies) in &results {
         super::print(&table(name, &scored(1, tallies)))?;
     }
-    if !predictions.is_empty() {
+    if !pushed.predictions.is_empty() {
         super::print("\nafter pushes, on the floor cells that change:  occupied IoU  semantic mIoU  mECE occ.\n")?;
-        for (name, s) in &predictions {
+        for (name, s) in &pushed.predictions {
             let line =
                 format!("{name:<45} {:>13.3} {:>14.3} {:>10.3}\n", s.occupied_iou, s.semantic_miou, s.mece_occupancy);
             super::print(&line)?;
         }
         super::print("\nwhole map after a push and some views:\n")?;
-        for (name, tallies) in &afterwards {
+        for (name, tallies) in &pushed.afterwards {
             super::print(&table(name, &scored(0, tallies)))?;
         }
     }
     page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
 }
 
-/// Writes `calibration.html` and `calibration.png` into a directory; gives the page's path.
-fn write_page(out: &Path, data: &Path, scenes: usize, results: &[(String, Vec<Tally>)]) -> Result<PathBuf, Error> {
-    let title = format!("Belief updates on {scenes} held-out scenes, random views");
-    let updates: Vec<Calibrated<'_>> = results.iter().map(|(name, tallies)| Calibrated { name, tallies }).collect();
-    let figure = calibration(&title, &updates);
+/// What held-out pushes gave.
+#[derive(Default)]
+struct Pushed {
+    /// By prediction: scores on the floor cells that pushes change.
+    predictions: Vec<(String, Scores)>,
+    /// By belief update: counts of the whole map after a push and so many views.
+    afterwards: Vec<(String, Vec<Tally>)>,
+}
+
+/// The data that scores are of.
+struct Source<'a> {
+    directory: &'a Path,
+    scenes: usize,
+}
+
+/// Writes `calibration.html` and `calibration.png` into a directory, with pushes `calibration-pushes.png` too; gives the
+/// page's path.
+fn write_page(
+    out: &Path,
+    of_views: Source<'_>,
+    results: &[(String, Vec<Tally>)],
+    of_pushes: Option<Source<'_>>,
+    pushed: &Pushed,
+) -> Result<PathBuf, Error> {
+    std::fs::create_dir_all(out).map_err(|error| Error::io(out, error))?;
+    let title = format!("Belief updates on {} held-out scenes, random views", of_views.scenes);
     let mut html = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n<style>body {{ font: 15px/1.5 \
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title>\n<style>body {{ font: 15px/1.5 \
          Ubuntu, sans-serif; color: #22242a; max-width: 1060px; margin: 2em auto }} td, th {{ padding: 0 1em 0 0; text-align: \
-         right }} svg {{ max-width: 100% }}</style></head><body>\n<h1>{0}</h1>\n<p>Data: {1}</p>\n{2}\n",
-        escape(&title),
-        escape(&data.display().to_string()),
-        figure.document()
+         right }} td:first-child, th:first-child {{ text-align: left }} svg {{ max-width: 100%; height: auto }}</style></head>\
+         <body>\n",
+        escape(&title)
     );
-    for (name, tallies) in results {
-        html += &format!(
-            "<h2>{}</h2>\n<table><tr><th>views</th><th>occupancy IoU</th><th>occupied IoU</th><th>semantic mIoU</th>\
-             <th>mECE occupancy</th><th>mECE semantics</th></tr>\n",
-            escape(name)
-        );
-        for s in scored(1, tallies) {
-            let numbers = [s.occupancy_iou, s.occupied_iou, s.semantic_miou, s.mece_occupancy, s.mece_semantics];
-            let cells: String = numbers.iter().map(|n| format!("<td>{n:.3}</td>")).collect();
-            html += &format!("<tr><td>{}</td>{cells}</tr>\n", s.views);
+    html += &section(&title, &of_views, &VIEWS, results, &out.join("calibration.png"))?;
+    if let Some(source) = of_pushes {
+        let title = format!("Beliefs after a push, first pushes of {} held-out scenes", source.scenes);
+        let picture = out.join("calibration-pushes.png");
+        html += &section(&title, &source, &VIEWS_AFTER_PUSH, &pushed.afterwards, &picture)?;
+        html += "<h2>Predictions, on the floor cells that pushes change</h2>\n<table><tr><th>prediction</th>\
+                 <th>occupied IoU</th><th>semantic mIoU</th><th>mECE occupancy</th></tr>\n";
+        for (name, s) in &pushed.predictions {
+            html += &row(&escape(name), &[s.occupied_iou, s.semantic_miou, s.mece_occupancy]);
         }
         html += "</table>\n";
     }
     html += "</body></html>\n";
-    std::fs::create_dir_all(out).map_err(|error| Error::io(out, error))?;
-    picture::save(&figure.render(PIXELS_PER_UNIT)?, &out.join("calibration.png"))?;
     let page = out.join("calibration.html");
     write_atomically(&page, html.as_bytes())?;
     Ok(page)
+}
+
+/// A figure, saved as `picture` too, and its numbers, as HTML.
+fn section(
+    title: &str,
+    source: &Source<'_>,
+    over: &Views,
+    results: &[(String, Vec<Tally>)],
+    picture: &Path,
+) -> Result<String, Error> {
+    let updates: Vec<Calibrated<'_>> = results.iter().map(|(name, tallies)| Calibrated { name, tallies }).collect();
+    let figure = calibration(title, over, &updates);
+    picture::save(&figure.render(PIXELS_PER_UNIT)?, picture)?;
+    let data = escape(&source.directory.display().to_string());
+    let mut html = format!("<h1>{}</h1>\n<p>Data: {data}</p>\n{}\n", escape(title), figure.document());
+    for (name, tallies) in results {
+        html += &format!(
+            "<h2>{}</h2>\n<table><tr><th>{}</th><th>occupancy IoU</th><th>occupied IoU</th><th>semantic mIoU</th>\
+             <th>mECE occupancy</th><th>mECE semantics</th></tr>\n",
+            escape(name),
+            over.name
+        );
+        for s in scored(over.first, tallies) {
+            let numbers = [s.occupancy_iou, s.occupied_iou, s.semantic_miou, s.mece_occupancy, s.mece_semantics];
+            html += &row(&s.views.to_string(), &numbers);
+        }
+        html += "</table>\n";
+    }
+    Ok(html)
+}
+
+fn row(name: &str, numbers: &[f64]) -> String {
+    let cells: String = numbers.iter().map(|number| format!("<td>{number:.3}</td>")).collect();
+    format!("<tr><td>{name}</td>{cells}</tr>\n")
 }

@@ -9,17 +9,30 @@ use nudge_core::score::{BIN_COUNT, Reliability, ReliabilityBin, Scores, Tally};
 pub struct Calibrated<'a> {
     /// Its name.
     pub name: &'a str,
-    /// Counts after 1, 2, ... views.
+    /// Counts after each number of views, from the axis' first on.
     pub tallies: &'a [Tally],
 }
+
+/// The numbers of views that a figure goes over.
+pub struct Views {
+    /// What they are, as the axes' name.
+    pub name: &'static str,
+    /// The first number.
+    pub first: usize,
+    /// Those that have a reliability diagram.
+    pub shown: [usize; 3],
+}
+
+/// Views of a scene nobody has seen before.
+pub const VIEWS: Views = Views { name: "views", first: 1, shown: [1, 3, 10] };
+/// Views of what a push left; before the first there is the prediction of the push.
+pub const VIEWS_AFTER_PUSH: Views = Views { name: "views after the push", first: 0, shown: [0, 1, 4] };
 
 /// Colours of the updates, in their order.
 const COLORS: [Rgb; 4] = [[27, 94, 166], [214, 96, 20], [90, 90, 100], [94, 60, 120]];
 /// Size of the page and of its panels.
-const SIZE: [f32; 2] = [1060.0, 720.0];
+const SIZE: [f32; 2] = [1060.0, 736.0];
 const PANEL: [f32; 2] = [250.0, 220.0];
-/// Numbers of views that have a reliability diagram.
-const SHOWN: [usize; 3] = [1, 3, 10];
 
 /// A score that has a panel: its title, and how it is read.
 type Measure = (&'static str, fn(&Scores) -> f64);
@@ -32,7 +45,7 @@ const MEASURES: [Measure; 4] = [
 ];
 
 /// Draws the figure; `title` says what data it is of.
-pub fn calibration(title: &str, updates: &[Calibrated<'_>]) -> Svg {
+pub fn calibration(title: &str, over: &Views, updates: &[Calibrated<'_>]) -> Svg {
     let mut svg = Svg::new(SIZE);
     svg.text(&Text::new(title, [24.0, 30.0], 17.0));
     let mut x = 24.0;
@@ -42,23 +55,24 @@ pub fn calibration(title: &str, updates: &[Calibrated<'_>]) -> Svg {
         x += 60.0 + super::text_width(update.name, 12.0);
     }
     for (at, measure) in MEASURES.iter().enumerate() {
-        against_views(&mut svg, [24.0 + at as f32 * 258.0, 78.0], measure, updates);
+        against_views(&mut svg, [24.0 + at as f32 * 258.0, 78.0], measure, over, updates);
     }
     svg.text(&Text::new(
         "Reliability: share that is right against confidence, mean over the true classes",
         [24.0, 334.0],
         14.0,
     ));
-    let shown: Vec<usize> = SHOWN.into_iter().filter(|n| updates.iter().all(|u| u.tallies.len() >= *n)).collect();
+    let there = |views: usize| updates.iter().all(|update| update.tallies.len() > views - over.first);
+    let shown: Vec<usize> = over.shown.into_iter().filter(|views| there(*views)).collect();
     for (row, what) in ["occupancy", "semantics"].into_iter().enumerate() {
         for (column, &views) in shown.iter().enumerate() {
-            let corner = [24.0 + 346.0 * column as f32, 352.0 + 182.0 * row as f32];
+            let corner = [24.0 + 346.0 * column as f32, 352.0 + 196.0 * row as f32];
             let counts = updates.iter().map(|update| {
-                let tally = &update.tallies[views - 1];
+                let tally = &update.tallies[views - over.first];
                 if row == 0 { &tally.occupancy_reliability } else { &tally.semantics_reliability }
             });
-            let plural = if views == 1 { "view" } else { "views" };
-            reliability(&mut svg, corner, &format!("{what} after {views} {plural}"), &counts.collect::<Vec<_>>());
+            let name = if views == 1 { over.name.replacen("views", "view", 1) } else { over.name.to_owned() };
+            reliability(&mut svg, corner, &format!("{what}, {views} {name}"), &counts.collect::<Vec<_>>());
         }
     }
     svg
@@ -74,25 +88,25 @@ fn axes(svg: &mut Svg, [left, top]: [f32; 2], [width, height]: [f32; 2], title: 
     inner
 }
 
-fn against_views(svg: &mut Svg, corner: [f32; 2], measure: &Measure, updates: &[Calibrated<'_>]) {
-    let inner = axes(svg, corner, PANEL, measure.0, "views");
+fn against_views(svg: &mut Svg, corner: [f32; 2], measure: &Measure, over: &Views, updates: &[Calibrated<'_>]) {
+    let inner = axes(svg, corner, PANEL, measure.0, over.name);
     let values: Vec<Vec<f64>> =
         updates.iter().map(|update| update.tallies.iter().map(|tally| measure.1(&tally.scores())).collect()).collect();
     let largest = values.iter().flatten().copied().fold(0.0, f64::max);
     let top = if measure.0.contains("IoU") { 1.0 } else { (largest * 11.0).ceil() / 10.0 };
-    let views = updates.iter().map(|update| update.tallies.len()).max().unwrap_or(1).max(2);
-    let x = |view: usize| inner[0] + inner[2] * (view - 1) as f32 / (views - 1) as f32;
+    let count = updates.iter().map(|update| update.tallies.len()).max().unwrap_or(1).max(2);
+    let x = |at: usize| inner[0] + inner[2] * at as f32 / (count - 1) as f32;
     let y = |value: f64| inner[1] + inner[3] * (1.0 - (value / top.max(1e-9)) as f32);
     for (value, label) in nice_ticks([0.0, top], 4) {
         svg.line([inner[0], y(value)], [inner[0] + inner[2], y(value)], Stroke::new(HAIRLINE, 0.8));
         svg.text(&Text::new(label, [inner[0] - 5.0, y(value) + 3.6], 10.0).anchored(Anchor::End).colored(SOFT_INK));
     }
-    for view in (1..=views).filter(|view| *view == 1 || view % 2 == 1 || *view == views) {
+    for view in (0..count).filter(|at| count < 7 || at % 2 == 0 || at + 1 == count) {
         let at = [x(view), inner[1] + inner[3] + 14.0];
-        svg.text(&Text::new(view.to_string(), at, 10.0).anchored(Anchor::Middle).colored(SOFT_INK));
+        svg.text(&Text::new((over.first + view).to_string(), at, 10.0).anchored(Anchor::Middle).colored(SOFT_INK));
     }
     for (values, rgb) in values.iter().zip(COLORS) {
-        let points: Vec<[f32; 2]> = values.iter().enumerate().map(|(at, value)| [x(at + 1), y(*value)]).collect();
+        let points: Vec<[f32; 2]> = values.iter().enumerate().map(|(at, value)| [x(at), y(*value)]).collect();
         svg.polyline(&points, Stroke::new(rgb, 2.0));
         if let (Some(last), Some(value)) = (points.last(), values.last()) {
             svg.text(&Text::new(format!("{value:.2}"), [last[0] + 4.0, last[1] + 4.0], 11.0).colored(rgb));

@@ -110,9 +110,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let of_views = Source { directory: &args.data, scenes: data.len() };
     let page = args.out.as_deref().map(|out| write_page(out, of_views, &results, of_pushes, &pushed)).transpose()?;
     if args.json {
-        let rows = |first: usize, of: &[(String, Vec<Tally>)]| {
-            let row = |(name, tallies): &(String, Vec<Tally>)| serde_json::json!({ "belief": name, "scores": scored(first, tallies), "tallies": tallies });
-            of.iter().map(row).collect::<Vec<_>>()
+        let rows = |first: usize, of: &[(String, Vec<Tally>)]| -> Vec<serde_json::Value> {
+            of.iter()
+                .map(|(name, tallies)| {
+                    serde_json::json!({ "belief": name, "scores": scored(first, tallies), "tallies": tallies })
+                })
+                .collect()
         };
         let predictions: Vec<_> = (pushed.predictions.iter())
             .map(|(name, scores)| serde_json::json!({ "prediction": name, "scores": scores }))

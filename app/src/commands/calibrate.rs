@@ -123,14 +123,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return super::print(&super::to_json(&serde_json::json!({
             "data": args.data,
             "scenes": data.len(),
-            "results": rows(1, &results),
+            "results": rows(VIEWS.first, &results),
             "changed_cells": predictions,
-            "after_pushes": rows(0, &pushed.afterwards),
+            "after_pushes": rows(VIEWS_AFTER_PUSH.first, &pushed.afterwards),
         }))?);
     }
     super::print(&format!("{}: {} scenes\n", args.data.display(), data.len()))?;
     for (name, tallies) in &results {
-        super::print(&table(name, &scored(1, tallies)))?;
+        super::print(&table(name, &scored(VIEWS.first, tallies)))?;
     }
     if !pushed.predictions.is_empty() {
         super::print("\nafter pushes, on the floor cells that change:  occupied IoU  semantic mIoU  mECE occ.\n")?;
@@ -141,7 +141,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
         super::print("\nwhole map after a push and some views:\n")?;
         for (name, tallies) in &pushed.afterwards {
-            super::print(&table(name, &scored(0, tallies)))?;
+            super::print(&table(name, &scored(VIEWS_AFTER_PUSH.first, tallies)))?;
         }
     }
     page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
@@ -176,7 +176,8 @@ fn write_page(
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{}</title>\n<style>body {{ font: 15px/1.5 \
          Ubuntu, sans-serif; color: #22242a; max-width: 1060px; margin: 2em auto }} td, th {{ padding: 0 1em 0 0; text-align: \
-         right }} td:first-child, th:first-child {{ text-align: left }} svg {{ max-width: 100%; height: auto }}</style></head>\
+         right }} td:first-child, th:first-child {{ text-align: left }} svg {{ max-width: 100%; height: auto }} \
+         svg text {{ font-family: Ubuntu, sans-serif }}</style></head>\
          <body>\n",
         escape(&title)
     );

@@ -170,9 +170,9 @@ fn a_run_begins_with_finished_weights() {
 }
 
 /// The shipped sigma_o learns four scenes by heart: one scene a batch for many small updates, and a step size that falls to
-/// nothing (cosine). Fresh weights are at 0.969 after 6,000 such updates, for which the whole test would take twice as long.
+/// nothing (cosine). Fresh weights are at 0.969 after 6,000 such updates and need more of them.
 #[test]
-#[ignore = "trains for a quarter of an hour; make test-cnabu runs it"]
+#[ignore = "trains for twenty minutes of a core; make test-cnabu runs it"]
 fn a_network_overfits_four_scenes() {
     const ROUNDS: usize = 170;
     let (_directory, data) = data(4);

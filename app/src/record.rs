@@ -215,7 +215,9 @@ impl Recorder {
             self.fix(&format!("{path}/{}", paths::SCALE), &legend.bar)?;
             self.fix(&format!("{path}/{}", paths::SCALE_LABELS), &legend.labels)?;
         }
-        self.fix(paths::CLASS_LEGEND, &floor::class_legend(setting.catalog))?;
+        let legend = floor::ClassLegend::new(setting.catalog);
+        self.fix(paths::CLASS_LEGEND, &legend.colors)?;
+        self.fix(paths::CLASS_LEGEND_NAMES, &legend.names)?;
         for series in decision::SERIES {
             let line = rerun::SeriesLines::new()
                 .with_names([series.title])

@@ -208,6 +208,20 @@ fn every_layout_looks_as_it_did() {
 }
 
 #[test]
+fn a_recording_is_shown_in_its_own_layout() {
+    let dir = tempfile::tempdir().expect("folder");
+    let picture = dir.path().join("recording.png");
+    let recording = EPISODES.1[0].join("episode.rrd");
+    let args = ["open", recording.to_str().expect("utf-8"), "--picture", picture.to_str().expect("utf-8")];
+    let (status, said) = under_xvfb(&args, |_| ());
+    assert!(status.success(), "{status}: {said}");
+    // The map of errors is mostly white, where the window's own views have nothing so light at all.
+    let shown = image::open(&picture).expect("a picture").into_rgb8();
+    let white = shown.pixels().filter(|pixel| pixel.0.iter().all(|channel| *channel > 240)).count();
+    assert!(white > 10_000, "{white} white pixels");
+}
+
+#[test]
 fn the_stock_viewer_verifies_and_shows_an_export() {
     let Some(rerun) = venv_tool("rerun") else { return };
     let dir = tempfile::tempdir().expect("folder");

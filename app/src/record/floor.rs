@@ -26,17 +26,47 @@ pub fn class_names(catalog: &Catalog) -> rerun::AnnotationContext {
     )
 }
 
-/// The classes' names beside their colours, one below the other.
-pub fn class_legend(catalog: &Catalog) -> rerun::Points2D {
-    let classes = (0..OBJECT_CLASS_COUNT as u8).map(ClassId).chain([BACKGROUND]);
-    let mut entries: Vec<(String, Rgb)> =
-        classes.map(|class| (colors::class_title(catalog, class), colors::of_class(catalog, class))).collect();
-    entries.push(("unknown".to_owned(), colors::UNKNOWN_RGB));
-    rerun::Points2D::new((0..entries.len()).map(|at| [0.0, at as f32]))
-        .with_colors(entries.iter().map(|(_, rgb)| rerun::Color::from(*rgb)))
-        .with_labels(entries.iter().map(|(name, _)| name.as_str()))
-        .with_show_labels(true)
-        .with_radii([rerun::Radius::new_ui_points(4.0)])
+/// Entries of the legend in a row, and how far they are apart against its rows: a name is wider than high.
+const LEGEND_COLUMNS: usize = 6;
+const LEGEND_COLUMN: f32 = 5.0;
+/// Where an entry's name is, seen from its colour. Rerun draws labels below their point.
+const LEGEND_NAME: [f32; 2] = [2.45, -0.75];
+
+/// The classes' colours and their names beside them.
+pub struct ClassLegend {
+    /// A dot for each class.
+    pub colors: rerun::Points2D,
+    /// The names, in a colour that reads on any of the viewer's own.
+    pub names: rerun::Points2D,
+}
+
+impl ClassLegend {
+    /// What a view has to show of it, x and y from and to: a wide strip.
+    pub const BOUNDS: [[f64; 2]; 2] = {
+        let rows = (OBJECT_CLASS_COUNT + 2).div_ceil(LEGEND_COLUMNS);
+        [[-0.5, LEGEND_COLUMNS as f64 * LEGEND_COLUMN as f64 - 0.5], [-0.7, rows as f64 - 0.3]]
+    };
+
+    /// The legend of a catalogue.
+    pub fn new(catalog: &Catalog) -> Self {
+        let classes = (0..OBJECT_CLASS_COUNT as u8).map(ClassId).chain([BACKGROUND]);
+        let mut entries: Vec<(String, Rgb)> =
+            classes.map(|class| (colors::class_title(catalog, class), colors::of_class(catalog, class))).collect();
+        entries.push(("unknown".to_owned(), colors::UNKNOWN_RGB));
+        let place = |at: usize| [(at % LEGEND_COLUMNS) as f32 * LEGEND_COLUMN, (at / LEGEND_COLUMNS) as f32];
+        let beside = |at: usize| [place(at)[0] + LEGEND_NAME[0], place(at)[1] + LEGEND_NAME[1]];
+        let count = entries.len();
+        Self {
+            colors: rerun::Points2D::new((0..count).map(place))
+                .with_colors(entries.iter().map(|(_, rgb)| rerun::Color::from(*rgb)))
+                .with_radii([rerun::Radius::new_ui_points(5.0)]),
+            names: rerun::Points2D::new((0..count).map(beside))
+                .with_colors([rerun::Color::from([190, 190, 195])])
+                .with_labels(entries.iter().map(|(name, _)| name.as_str()))
+                .with_show_labels(true)
+                .with_radii([rerun::Radius::new_ui_points(0.0)]),
+        }
+    }
 }
 
 /// A coloured picture.

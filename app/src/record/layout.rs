@@ -2,6 +2,7 @@
 //! and the decision in words.
 
 use super::blueprint::{Layout, Part, View};
+use super::floor::ClassLegend;
 use super::paths;
 use crate::picture::FloorPlan;
 use rerun::external::re_sdk_types::blueprint::{archetypes as bp, components as bpc};
@@ -51,15 +52,12 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
             shown.push(at(paths::TRUTH_OUTLINES));
         }
         let [width, depth] = plan.size.map(|n| n as f64);
-        let below = if SCALED.contains(&path) { 0.20 } else { 0.02 };
-        let bounds = rerun::datatypes::Range2D {
-            x_range: [-0.01 * width, 1.01 * width].into(),
-            y_range: [-0.02 * depth, (1.0 + below) * depth].into(),
-        };
-        let bounds = bp::VisualBounds2D::new(bounds);
-        Part::View(View::new("2D", name, root_or_slash(root), shown).with("VisualBounds2D", &bounds))
+        let below = if SCALED.contains(&path) { 0.30 } else { 0.02 };
+        let bounds = [[-0.01 * width, 1.01 * width], [-0.02 * depth, (1.0 + below) * depth]];
+        Part::View(within(View::new("2D", name, root_or_slash(root), shown), bounds))
     };
-    let legend = Part::View(View::new("2D", "Legend", root_or_slash(root), [at(paths::CLASS_LEGEND)]));
+    let legend = View::new("2D", "Legend", root_or_slash(root), [format!("{}/**", at(paths::CLASS_LEGEND))]);
+    let legend = Part::View(within(legend, ClassLegend::BOUNDS));
     let left_maps = vec![
         (1.0, map("Semantic belief", paths::BELIEF_SEMANTICS, true)),
         (1.0, map("Entropy", paths::BELIEF_ENTROPY, false)),
@@ -75,7 +73,7 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
         map("Surprise", paths::PREDICTED_SURPRISE, true),
     ];
     let right_maps = vec![(1.0, Part::Tabs(error_maps)), (1.0, Part::Tabs(certainty_maps))];
-    let maps = Part::Row(vec![(1.0, Part::Column(left_maps)), (1.0, Part::Column(right_maps)), (0.36, legend)]);
+    let maps = Part::Row(vec![(1.0, Part::Column(left_maps)), (1.0, Part::Column(right_maps))]);
     let flat = |name: &str, path: &str| {
         Part::View(View::new("2D", name, root_or_slash(root), [at(path), format!("{}/**", at(path))]))
     };
@@ -122,8 +120,14 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
         ),
     ]);
     let left = Part::Column(vec![(2.7, spaces), (1.0, scores)]);
-    let right = Part::Column(vec![(1.3, maps), (0.75, camera), (1.1, words)]);
+    let right = Part::Column(vec![(1.3, maps), (0.46, legend), (0.75, camera), (1.0, words)]);
     Layout { root: Part::Row(vec![(1.25, left), (1.0, right)]) }
+}
+
+/// A plane view that shows x and y from and to.
+fn within(view: View, [x, y]: [[f64; 2]; 2]) -> View {
+    let bounds = rerun::datatypes::Range2D { x_range: x.into(), y_range: y.into() };
+    view.with("VisualBounds2D", &bp::VisualBounds2D::new(bounds))
 }
 
 fn root_or_slash(root: &str) -> &str {

@@ -26,8 +26,10 @@ pub const OBSERVATION_DEPTH: &str = "observation/depth";
 pub const OBSERVATION_LABELS: &str = "observation/labels";
 /// Voxels believed occupied, by probability.
 pub const BELIEF_OCCUPANCY: &str = "belief/occupancy";
-/// The classes' names in their colours.
+/// The classes' colours.
 pub const CLASS_LEGEND: &str = "belief/semantics/legend";
+/// The classes' names beside their colours.
+pub const CLASS_LEGEND_NAMES: &str = "belief/semantics/legend/names";
 /// The likeliest class per floor cell.
 pub const BELIEF_SEMANTICS: &str = "belief/semantics";
 /// Voxels believed occupied, in the colours of the classes.

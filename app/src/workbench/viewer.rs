@@ -19,6 +19,7 @@ use std::path::Path;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// The application id of the window's own recording; layouts of shared recordings go by another.
 pub const APPLICATION: &str = "nudge_workbench";
@@ -35,12 +36,17 @@ pub struct Clicked {
     pub instance: Option<usize>,
 }
 
+/// How long a recording may take until it is shown.
+const LOADING: Duration = Duration::from_secs(60);
+
 /// The embedded viewer.
 pub struct Viewer {
     app: re_viewer::App,
     clicked: Rc<RefCell<Option<Clicked>>>,
     /// Whether a foreign recording is shown, which the viewer's own keys play.
     is_foreign: Arc<AtomicBool>,
+    /// When the foreign recording was asked for.
+    asked: Option<Instant>,
     /// Dropped last: the viewer's own tasks run on it.
     _runtime: tokio::runtime::Runtime,
 }
@@ -117,7 +123,7 @@ impl Viewer {
         app.add_log_receiver(receiver);
         let stream = stream_into(sender, serve).map_err(|error| error.to_string())?;
         drop(_entered);
-        Ok((Self { app, clicked, is_foreign, _runtime: runtime }, stream))
+        Ok((Self { app, clicked, is_foreign, asked: None, _runtime: runtime }, stream))
     }
 
     /// Takes in what was logged. To be called every frame, before [`Viewer::ui`].
@@ -151,7 +157,14 @@ impl Viewer {
     /// Shows a recording in place of the window's own.
     pub fn open_recording(&mut self, path: &Path) {
         self.is_foreign.store(true, Ordering::Relaxed);
+        self.asked = Some(Instant::now());
         self.app.open_url_or_file(&path.to_string_lossy());
+    }
+
+    /// Whether a recording was asked for that is not there yet. One that does not come is not waited for.
+    pub fn is_loading(&self) -> bool {
+        let shown = self.app.active_recording_id().is_some_and(|id| id.application_id().as_str() != APPLICATION);
+        !shown && self.asked.is_some_and(|asked| asked.elapsed() < LOADING)
     }
 
     /// Moves the time of the recording that is shown, as the viewer's own keys would.
@@ -164,6 +177,7 @@ impl Viewer {
     /// Goes back to the window's own recording.
     pub fn close_recording(&mut self) {
         self.is_foreign.store(false, Ordering::Relaxed);
+        self.asked = None;
         use rerun::external::re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
         let own = re_log_types::ApplicationId::from(APPLICATION);
         self.app.command_sender.send_system(SystemCommand::ActivateApp(own));

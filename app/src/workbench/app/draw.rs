@@ -23,6 +23,7 @@ impl App {
             self.openings.values().map(|opening| (opening.title.clone(), opening.activity)).collect();
         self.parts.clear();
         if self.model.recording.is_some() {
+            egui::Panel::top("recording").show(ui, |ui| self.recording_bar(ui, &mut ask));
             self.space_view(ui, frame);
         } else if self.model.kept.layout == LayoutKind::Author {
             egui::CentralPanel::default().show(ui, |ui| panels::author::show(ui, &mut self.model, &mut ask));
@@ -235,35 +236,32 @@ impl App {
         }
         panels::windows::tasks(ctx, self.tasks.under_way(), ask);
         panels::windows::toasts(ctx, &mut self.model.toasts, ask);
-        if self.model.recording.is_some() {
-            egui::Area::new(egui::Id::new("recording")).anchor(egui::Align2::CENTER_TOP, [0.0, 34.0]).show(ctx, |ui| {
-                egui::Frame::popup(ui.style()).show(ui, |ui| {
-                    ui.horizontal(|ui| {
-                        let name = self.model.recording.as_ref().map(|path| path.display().to_string());
-                        ui.label(format!("Recording {}", name.unwrap_or_default()));
-                        let steps = [
-                            ("⏮", "Beginning of the recording", RecordingCommandKind::PlaybackBeginning),
-                            ("⏴", "A step back in the recording", RecordingCommandKind::PlaybackStepBack),
-                            ("⏯", "Play or pause the recording", RecordingCommandKind::PlaybackTogglePlayPause),
-                            ("⏵", "A step on in the recording", RecordingCommandKind::PlaybackStepForward),
-                            ("⏭", "End of the recording", RecordingCommandKind::PlaybackEndAndFollow),
-                        ];
-                        for (icon, words, kind) in steps {
-                            let button = ui.button(icon);
-                            button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, words));
-                            if let Some(viewer) = self.viewer.as_mut().filter(|_| button.on_hover_text(words).clicked())
-                            {
-                                viewer.play(kind);
-                            }
-                        }
-                        let back = if self.model.sessions.is_empty() { "Close" } else { "Back to the episode" };
-                        if ui.button(back).on_hover_text("The recording's file stays as it is").clicked() {
-                            ask.push(Command::CloseRecording);
-                        }
-                    });
-                });
-            });
-        }
+    }
+
+    /// The recording that is looked at, and its clock.
+    fn recording_bar(&mut self, ui: &mut egui::Ui, ask: &mut Vec<Command>) {
+        ui.horizontal(|ui| {
+            let name = self.model.recording.as_ref().map(|path| path.display().to_string());
+            ui.label(format!("Recording {}", name.unwrap_or_default()));
+            let steps = [
+                ("⏮", "Beginning of the recording", RecordingCommandKind::PlaybackBeginning),
+                ("⏴", "A step back in the recording", RecordingCommandKind::PlaybackStepBack),
+                ("⏯", "Play or pause the recording", RecordingCommandKind::PlaybackTogglePlayPause),
+                ("⏵", "A step on in the recording", RecordingCommandKind::PlaybackStepForward),
+                ("⏭", "End of the recording", RecordingCommandKind::PlaybackEndAndFollow),
+            ];
+            for (icon, words, kind) in steps {
+                let button = ui.button(icon);
+                button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, true, words));
+                if let Some(viewer) = self.viewer.as_mut().filter(|_| button.on_hover_text(words).clicked()) {
+                    viewer.play(kind);
+                }
+            }
+            let back = if self.model.sessions.is_empty() { "Close" } else { "Back to the episode" };
+            if ui.button(back).on_hover_text("The recording's file stays as it is").clicked() {
+                ask.push(Command::CloseRecording);
+            }
+        });
     }
 
     /// Keeps the name of the graphics driver where the box about versions finds it.

@@ -8,7 +8,7 @@ use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, Picked};
 use crate::workbench::session::{Activity, Session, SessionId};
 use crate::workbench::space::{Side, Space};
-use crate::workbench::viewer::Clicked;
+use crate::workbench::viewer::{Clicked, Viewer};
 use crate::workbench::worker::{Event, Opened};
 use rerun::external::egui;
 use std::sync::{Arc, PoisonError};
@@ -256,9 +256,10 @@ impl App {
         }
     }
 
-    /// Asks for the three-dimensional views, if something about them has changed.
+    /// Asks for the three-dimensional views, if something about them has changed. Not while a foreign recording is looked
+    /// at: the viewer goes to where a layout is sent.
     fn space(&mut self) {
-        let Some(painter) = &self.painter else { return };
+        let Some(painter) = self.painter.as_ref().filter(|_| self.model.recording.is_none()) else { return };
         // Where the views are is known once they were drawn.
         let place = self.parts.iter().find(|(part, _)| *part == Part::Space).map(|(_, rect)| rect.aspect_ratio());
         let Some(aspect) = place.filter(|aspect| aspect.is_finite()) else { return };
@@ -324,7 +325,7 @@ impl App {
     fn script(&mut self) {
         let Some(script) = self.options.script.clone() else { return };
         (self.wake)();
-        if self.is_busy() {
+        if self.is_busy() || self.viewer.as_ref().is_some_and(Viewer::is_loading) {
             return;
         }
         let done = self.model.session().map_or(0, Session::steps);

@@ -239,9 +239,9 @@ impl Here<'_> {
         let place = format!("x {}, y {} m", words::metres(x), words::metres(y));
         let facts = [
             fact("value", nats(weighed::value(candidate, gamma)), "Gain + γ·Reg"),
-            fact("gain", nats(candidate.gain), "Best single view under the predicted belief"),
+            fact("gain", nats(candidate.gain), "What it is worth under the predicted belief: IGM, were it the best"),
             fact("Reg", nats(candidate.reg), "min(0, H(labels) − H(labels, predicted)): what it would blur"),
-            fact("best view", view, "The view with that gain"),
+            fact("best view", view, "The view that tells most under the predicted belief"),
             fact("from", place, "Where the tip starts"),
             fact("way", way.replace('-', "−"), "Length and direction; 90° is into the shelf"),
         ];

@@ -118,7 +118,11 @@ pub fn view_rows(
 pub const PUSH_COLUMNS: [Column; 7] = [
     Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
     Column { title: "Value", hint: "Gain + γ·Reg, nats: what looking has to beat", width: 50.0 },
-    Column { title: "Gain", hint: "Best single view after the predicted push, nats", width: 50.0 },
+    Column {
+        title: "Gain",
+        hint: "What the push is worth under the predicted belief: IGM, were it the best, nats",
+        width: 50.0,
+    },
     Column {
         title: "γ·Reg",
         hint: "What the push would blur, nats, at most 0: Reg = min(0, H(labels) − H(labels, predicted))",

@@ -57,12 +57,11 @@ pub fn play(steps: usize) -> Played {
                     rank += 1.0;
                     let feasible = c.rejection.is_none();
                     CandidateRecord {
-                        push: c.swept.push,
                         rejection: c.rejection.clone(),
                         gain: feasible.then_some(900.0 - 7.0 * rank),
                         view: feasible.then_some(ViewId(rank as u16 * 3)),
                         reg: feasible.then_some(-3.0 * rank),
-                        motion_s: None,
+                        ..CandidateRecord::of(c.swept.push)
                     }
                 })
                 .collect();

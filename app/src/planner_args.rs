@@ -20,6 +20,9 @@ pub struct PlannerArgs {
     /// else 1)
     #[arg(long, value_name = "X", value_parser = patience)]
     patience: Option<f32>,
+    /// What a push has to promise at least, 0 to 100000 nats (default: 2000 where only unseen voxels count, else 0)
+    #[arg(long, value_name = "NATS", value_parser = push_floor)]
+    push_floor: Option<f32>,
     /// The last steps, in which nothing is pushed (default: 4 where only unseen voxels count, else 1)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     closing_steps: Option<u16>,
@@ -28,6 +31,11 @@ pub struct PlannerArgs {
 fn patience(text: &str) -> Result<f32, String> {
     let number = text.parse().ok().filter(|number| (0.1..=100.0).contains(number));
     number.ok_or_else(|| "a number from 0.1 to 100 is needed".to_owned())
+}
+
+fn push_floor(text: &str) -> Result<f32, String> {
+    let nats = text.parse().ok().filter(|nats| (0.0..=1e5).contains(nats));
+    nats.ok_or_else(|| "a number of nats from 0 to 100000 is needed".to_owned())
 }
 
 impl PlannerArgs {
@@ -40,18 +48,20 @@ impl PlannerArgs {
         PlannerSettings {
             patience: self.patience.unwrap_or(settings.patience),
             closing_steps: self.closing_steps.map_or(settings.closing_steps, usize::from),
+            push_floor: self.push_floor.unwrap_or(settings.push_floor),
             ..settings
         }
     }
 }
 
 /// Every option with its value in some settings.
-pub fn options(planner: &PlannerSettings) -> [(&'static str, String); 5] {
+pub fn options(planner: &PlannerSettings) -> [(&'static str, String); 6] {
     [
         ("--gain", planner.counted.to_string()),
         ("--push-sampler", planner.push_sampler.to_string()),
         ("--candidates", planner.candidates.to_string()),
         ("--patience", planner.patience.to_string()),
+        ("--push-floor", planner.push_floor.to_string()),
         ("--closing-steps", planner.closing_steps.to_string()),
     ]
 }
@@ -82,8 +92,12 @@ mod tests {
 
     #[test]
     fn what_is_told_to_type_means_the_same_settings() {
-        let cases =
-            ["", "--gain all", "--gain unseen --patience 3", "--push-sampler hidden --closing-steps 10 --candidates 7"];
+        let cases = [
+            "",
+            "--gain all",
+            "--gain unseen --patience 3 --push-floor 500",
+            "--push-sampler hidden --closing-steps 10 --candidates 7",
+        ];
         for (typed, belief) in cases.into_iter().flat_map(|typed| [(typed, CNABU), (typed, CLASSICAL)]) {
             let meant = settings(typed, belief);
             assert_eq!(settings(&to_type(&meant, belief), belief), meant, "{typed} with {belief}");
@@ -94,7 +108,7 @@ mod tests {
 
     #[test]
     fn numbers_out_of_range_are_refused() {
-        for wrong in ["--patience 0", "--patience nan", "--patience 101", "--closing-steps 0"] {
+        for wrong in ["--patience 0", "--patience nan", "--patience 101", "--closing-steps 0", "--push-floor -1"] {
             assert!(
                 Typed::try_parse_from(std::iter::once("nudge").chain(wrong.split_whitespace())).is_err(),
                 "{wrong}"

@@ -11,7 +11,8 @@ mod weigh;
 pub use decide::decide;
 pub use policy::PolicyKind;
 pub use rule::{
-    CLOSING_STEPS, PATIENCE, PUSH_EVERY, QUIET_STEPS, RESTORING_STEPS, SATURATION, look_or_push, push_guard, saturated,
+    CLOSING_STEPS, PATIENCE, PUSH_EVERY, PUSH_FLOOR, QUIET_STEPS, RESTORING_STEPS, SATURATION, look_or_push,
+    push_guard, saturated,
 };
 pub use weigh::{COARSE_VIEWS, disturbance};
 
@@ -88,6 +89,13 @@ pub struct CandidateRecord {
     /// How long the arm's motion takes, in, along and back, seconds; `None` if rejected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion_s: Option<f64>,
+}
+
+impl CandidateRecord {
+    /// A push that was neither weighed nor rejected.
+    pub fn of(push: Push) -> Self {
+        Self { push, rejection: None, gain: None, view: None, reg: None, motion_s: None }
+    }
 }
 
 /// Everything that was weighed at one step and what was chosen.
@@ -278,6 +286,9 @@ pub struct PlannerSettings {
     pub gamma: f32,
     /// A push has to promise this many times what looking does: look if `patience IGV > IGM + gamma Reg`.
     pub patience: f32,
+    /// A push has to promise at least this, nats: it also costs, in things that were found and are lost again and in looks
+    /// that make good what it disturbs. Look if `max(patience IGV, push_floor) > IGM + gamma Reg`.
+    pub push_floor: f32,
     /// A floor cell whose likeliest class is more probable than this is certain.
     pub certain: f32,
     /// The map is complete, and nothing is pushed any more, once this share of the floor cells is certain.
@@ -298,6 +309,7 @@ impl Default for PlannerSettings {
             push_sampler: PushSampler::default(),
             gamma: GAMMA,
             patience: 1.0,
+            push_floor: 0.0,
             certain: CERTAIN,
             complete: COMPLETE_SHARE,
             quiet_steps: QUIET_STEPS,
@@ -309,14 +321,19 @@ impl Default for PlannerSettings {
 
 impl PlannerSettings {
     /// These settings with what goes with a way to count: the paper's rule where all voxels count. Where only unseen ones
-    /// do, a push has to promise [`PATIENCE`] times what looking does, and the last [`RESTORING_STEPS`] steps look: a push
-    /// takes about that many looks to pay off.
+    /// do, a push has to promise [`PATIENCE`] times what looking does, and at least [`PUSH_FLOOR`]; and the last
+    /// [`RESTORING_STEPS`] steps look: a push takes about that many looks to pay off.
     pub fn counting(self, counted: Counted) -> Self {
-        let (patience, closing_steps) = match counted {
-            Counted::All => (1.0, CLOSING_STEPS),
-            Counted::Unseen => (PATIENCE, RESTORING_STEPS),
+        let (patience, push_floor, closing_steps) = match counted {
+            Counted::All => (1.0, 0.0, CLOSING_STEPS),
+            Counted::Unseen => (PATIENCE, PUSH_FLOOR, RESTORING_STEPS),
         };
-        Self { counted, patience, closing_steps, ..self }
+        Self { counted, patience, push_floor, closing_steps, ..self }
+    }
+
+    /// What `IGM + gamma Reg` of a push has to reach where looking promises `igv`, nats.
+    pub fn asked_of_pushes(&self, igv: f32) -> f32 {
+        (self.patience * igv).max(self.push_floor)
     }
 }
 

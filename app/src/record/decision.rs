@@ -118,15 +118,16 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
 }
 
 fn weighed(page: &mut String, decision: &Decision, setting: &Setting<'_>) {
-    let PlannerSettings { counted, gamma, patience, .. } = *setting.planner;
+    let PlannerSettings { counted, gamma, .. } = *setting.planner;
     let sign = |holds: bool| if holds { " ◀" } else { "" };
     let push = decision.igm + gamma * decision.reg;
     let (looks, pushed) = (matches!(decision.action, Action::Look { .. }), decision.best_push.is_some());
     page.push_str("| weighed | nats |\n|:--|--:|\n");
     let _ = writeln!(page, "| look: IGV, {}{} | {:.1} |", counted.of_looks(), sign(looks), decision.igv);
     if pushed {
-        if patience != 1.0 {
-            let _ = writeln!(page, "|    patience·IGV, what a push has to promise | {:.1} |", patience * decision.igv);
+        let asked = setting.planner.asked_of_pushes(decision.igv);
+        if asked != decision.igv {
+            let _ = writeln!(page, "|    what a push has to promise | {asked:.1} |");
         }
         let _ = writeln!(page, "| push: IGM + γ·Reg{} | {push:.1} |", sign(!looks));
         let _ = writeln!(page, "|    IGM, {} | {:.1} |", counted.of_pushes(), decision.igm);
@@ -262,7 +263,7 @@ mod tests {
             };
             markdown(&setting, &record)
         };
-        let patient = PlannerSettings { patience: 10.0, ..PlannerSettings::default() };
+        let patient = PlannerSettings { patience: 10.0, push_floor: 50.0, ..PlannerSettings::default() };
         let with = page(&patient);
         assert!(with.contains("what a push has to promise | 300.0 |") && with.contains("γ·Reg ◀ | 390.0 |"), "{with}");
         assert!(!page(&PlannerSettings::default()).contains("has to promise"), "the paper's rule compares IGV itself");

@@ -44,24 +44,15 @@ pub fn record(steps: usize) -> EpisodeRecord {
         let push = Push { start: [0.01, 0.02, 0.06], direction_deg: 87.3, length_m: 0.1 };
         let action = if index == 2 { Action::Push(push) } else { Action::Look { view: ViewId(17) } };
         let gains: Vec<f32> = (0..300).map(|_| rng.random_range(0.0..5000.0)).collect();
-        let candidates = vec![
-            CandidateRecord {
-                push,
-                rejection: None,
-                gain: Some(gains[0]),
-                view: Some(ViewId(3)),
-                reg: Some(-0.7),
-                motion_s: Some(6.25),
-            },
-            CandidateRecord {
-                push,
-                rejection: Some(Rejection::Unreachable { stage: Stage::Start }),
-                gain: None,
-                view: None,
-                reg: None,
-                motion_s: None,
-            },
-        ];
+        let weighed = CandidateRecord {
+            gain: Some(gains[0]),
+            view: Some(ViewId(3)),
+            reg: Some(-0.7),
+            motion_s: Some(6.25),
+            ..CandidateRecord::of(push)
+        };
+        let rejection = Some(Rejection::Unreachable { stage: Stage::Start });
+        let candidates = vec![weighed, CandidateRecord { rejection, ..CandidateRecord::of(push) }];
         StepRecord {
             index,
             action,

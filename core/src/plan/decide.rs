@@ -88,7 +88,8 @@ fn choose(decision: &mut Decision, weighed: Weighed, settings: &PlannerSettings)
     };
     decision.igm = best.gain.unwrap_or(0.0);
     decision.reg = best.reg.unwrap_or(0.0);
-    decision.reason = look_or_push(settings.patience * decision.igv, decision.igm, decision.reg, settings.gamma);
+    let asked = settings.asked_of_pushes(decision.igv);
+    decision.reason = look_or_push(asked, decision.igm, decision.reg, settings.gamma);
     if decision.reason == Reason::PushTellsMore {
         decision.action = Action::Push(best.push);
     }

@@ -10,6 +10,9 @@ pub const CLOSING_STEPS: usize = 1;
 pub const RESTORING_STEPS: usize = 4;
 /// How many times what looking promises a push has to promise when unseen voxels count.
 pub const PATIENCE: f32 = 10.0;
+/// What a push has to promise at least when unseen voxels count, nats (RESULTS.md tells what pushes that promise less lead
+/// to).
+pub const PUSH_FLOOR: f32 = 2000.0;
 /// The scheduled policies push at every step whose number, counted from 1, is a multiple of this.
 pub const PUSH_EVERY: usize = 5;
 /// Relative difference of two consecutive best gains below which looking is saturated.

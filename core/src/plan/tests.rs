@@ -302,6 +302,7 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     // It pushes once looking has less to tell than the push, by far.
     assert_eq!(decision.reason, Reason::LookTellsMore);
     table.settings.patience = 0.9 * decision.igm / decision.igv;
+    table.settings.push_floor = 0.0;
     let decision = table.decide(PolicyKind::Mem);
     assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Push(best.push)));
 
@@ -339,7 +340,9 @@ fn disturbance_counts_blurred_labels_and_never_rewards() {
     table.settings.gamma = 1.1 * (decision.igm - decision.igv) / -decision.reg;
     assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
 
-    // So does patience.
+    // So does a floor, and patience.
+    table.settings = PlannerSettings { push_floor: 1.1 * decision.igm, ..PlannerSettings::default() };
+    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
     table.settings = PlannerSettings { patience: 1.1 * decision.igm / decision.igv, ..PlannerSettings::default() };
     assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
 
@@ -473,14 +476,7 @@ fn a_history_takes_down_what_was_done() {
     assert_eq!((history.actions.len(), history.used_views.len()), (1, 1));
     assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
 
-    let candidate = CandidateRecord {
-        push: push(),
-        rejection: None,
-        gain: Some(1.0),
-        view: Some(ViewId(3)),
-        reg: None,
-        motion_s: None,
-    };
+    let candidate = CandidateRecord { gain: Some(1.0), view: Some(ViewId(3)), ..CandidateRecord::of(push()) };
     let pushed =
         Decision { action: Action::Push(push()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
     history.record(&pushed, false);

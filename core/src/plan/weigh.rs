@@ -129,7 +129,7 @@ fn push_stream(situation: &Situation<'_>) -> ChaCha8Rng {
 fn record_of(candidate: &Candidate, situation: &Situation<'_>) -> CandidateRecord {
     let rejection = candidate.rejection.clone();
     let motion_s = candidate.motion.as_ref().map(|motion| motion.duration_s(&situation.arm.arm));
-    CandidateRecord { push: candidate.swept.push, rejection, gain: None, view: None, reg: None, motion_s }
+    CandidateRecord { rejection, motion_s, ..CandidateRecord::of(candidate.swept.push) }
 }
 
 /// The view with the largest gain, the first of equals, and that gain; no view and 0 without views.

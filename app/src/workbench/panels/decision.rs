@@ -90,10 +90,15 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
     let (gamma, patience) = (planner.gamma, planner.patience);
     let (look, push) = (decision.igv, decision.igm + gamma * decision.reg);
     let weighed = decision.best_push.is_some() && decision.igm != 0.0;
-    // What is compared: looking counts patience times where a push has to promise more.
-    let promised = patience * look;
-    let times = if patience == 1.0 { String::new() } else { format!("{patience}·") };
-    let scale = promised.max(decision.igm).max(1e-6);
+    // What is compared: looking counts patience times where a push has to promise more, and as much as it has to at least.
+    let asked = if weighed { planner.asked_of_pushes(look) } else { patience * look };
+    let is_floor = asked > patience * look;
+    let igv = match (is_floor, patience == 1.0) {
+        (true, _) => "floor".to_owned(),
+        (false, true) => "IGV".to_owned(),
+        (false, false) => format!("{patience}·IGV"),
+    };
+    let scale = asked.max(decision.igm).max(1e-6);
     let looks = matches!(decision.action, Action::Look { .. });
     let bar = |ui: &mut Ui, name: &str, value: f32, shade: f32, strong: bool, hint: &str| {
         let bar = spark::Bar {
@@ -106,13 +111,15 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
         spark::bar(ui, &bar, if patience == 1.0 { 74.0 } else { 88.0 }, 72.0).on_hover_text(hint);
     };
     let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsMore);
-    let hint = if patience == 1.0 {
-        format!("IGV: {}, nats", planner.counted.of_looks())
+    let (nats, of) = (words::nats(look), planner.counted.of_looks());
+    let hint = if is_floor {
+        format!("IGV: {of}, {nats}; a push has to promise {} at least", words::nats(asked))
+    } else if patience == 1.0 {
+        format!("IGV: {of}, nats")
     } else {
-        let nats = words::nats(look);
-        format!("IGV: {}, {nats}; a push has to promise {patience} times that", planner.counted.of_looks())
+        format!("IGV: {of}, {nats}; a push has to promise {patience} times that")
     };
-    bar(ui, &format!("Look: {times}IGV"), promised, 0.85, ruled && looks, &hint);
+    bar(ui, &format!("Look: {igv}"), asked, 0.85, ruled && looks, &hint);
     if weighed {
         bar(
             ui,
@@ -125,8 +132,7 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
         let reg = gamma * decision.reg;
         let hint = "What the push would blur, at most 0: Reg = min(0, H(labels) − H(labels, predicted))";
         bar(ui, "γ·Reg", reg, 0.1, false, hint);
-        let gap = promised - push;
-        let text = format!("{times}IGV − (IGM + γ·Reg) = {}", words::nats(gap));
+        let text = format!("{igv} − (IGM + γ·Reg) = {}", words::nats(asked - push));
         ui.label(RichText::new(text).small()).on_hover_text("The rule looks if this is above 0, and else pushes");
     } else {
         ui.label(RichText::new("No push was weighed").small().weak());

@@ -5,6 +5,7 @@ use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session};
 use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
+use nudge_core::push::PushSampler;
 use rerun::external::egui;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -207,6 +208,20 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
             .labelled_by(label.id)
             .on_hover_text("Push candidates drawn per decision, 0 to 1000; k = 80 in the paper");
         ui.end_row();
+        let label = ui.label("drawn");
+        egui::ComboBox::from_id_salt("drawn")
+            .selected_text(drawn_at(form.planner.push_sampler))
+            .show_ui(ui, |ui| {
+                for sampler in PushSampler::ALL {
+                    ui.selectable_value(&mut form.planner.push_sampler, sampler, drawn_at(sampler));
+                }
+            })
+            .response
+            .labelled_by(label.id)
+            .on_hover_text(
+                "Where push candidates are drawn: at the frontier as in the paper, or before what no look has seen",
+            );
+        ui.end_row();
         let label = ui.label("γ");
         ui.add(egui::DragValue::new(&mut form.planner.gamma).range(0.0..=10.0).speed(0.01))
             .labelled_by(label.id)
@@ -221,6 +236,14 @@ fn gain_of(counted: Counted) -> &'static str {
     match counted {
         Counted::All => "all voxels",
         Counted::Unseen => "unseen voxels",
+    }
+}
+
+/// Where push candidates are drawn, in words.
+fn drawn_at(sampler: PushSampler) -> &'static str {
+    match sampler {
+        PushSampler::Frontier => "at the frontier",
+        PushSampler::Hidden => "before the hidden",
     }
 }
 
@@ -256,6 +279,11 @@ fn thresholds(ui: &mut egui::Ui, planner: &mut PlannerSettings) {
         ui.add(egui::DragValue::new(&mut planner.patience).range(0.1..=100.0).speed(0.1))
             .labelled_by(label.id)
             .on_hover_text("Look if patience IGV > IGM + γ Reg, 0.1 to 100; 1 in the paper");
+        ui.end_row();
+        let label = ui.label("a push promises");
+        ui.add(egui::DragValue::new(&mut planner.push_floor).range(0.0..=1e5).speed(10.0).prefix("≥ ").suffix(" nats"))
+            .labelled_by(label.id)
+            .on_hover_text("A push has to promise at least this, 0 to 100000 nats; 0 in the paper");
         ui.end_row();
         let label = ui.label("saturated below");
         ui.add(share(&mut planner.saturation))

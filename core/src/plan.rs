@@ -47,6 +47,8 @@ pub enum Action {
 pub enum Reason {
     /// Looking tells more: `IGV > IGM + gamma Reg`.
     LookTellsMore,
+    /// Looking tells less than the best push, but that promises too little ([`PlannerSettings::push_floor`]).
+    PushTellsLittle,
     /// Pushing tells more: `IGV <= IGM + gamma Reg`.
     PushTellsMore,
     /// The view that made the last push worth it.

@@ -78,6 +78,7 @@ pub(crate) fn action(action: &Action) -> String {
 pub(crate) fn reason(reason: Reason) -> &'static str {
     match reason {
         Reason::LookTellsMore => "looking tells more",
+        Reason::PushTellsLittle => "no push promises enough",
         Reason::PushTellsMore => "pushing tells more",
         Reason::ViewOfPush => "the view that made the push worth it",
         Reason::TooEarly => "no push in the first steps",

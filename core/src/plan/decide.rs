@@ -88,8 +88,8 @@ fn choose(decision: &mut Decision, weighed: Weighed, settings: &PlannerSettings)
     };
     decision.igm = best.gain.unwrap_or(0.0);
     decision.reg = best.reg.unwrap_or(0.0);
-    let asked = settings.asked_of_pushes(decision.igv);
-    decision.reason = look_or_push(asked, decision.igm, decision.reg, settings.gamma);
+    let (looking, floor) = (settings.patience * decision.igv, settings.push_floor);
+    decision.reason = look_or_push(looking, floor, decision.igm, decision.reg, settings.gamma);
     if decision.reason == Reason::PushTellsMore {
         decision.action = Action::Push(best.push);
     }

@@ -18,11 +18,15 @@ pub const PUSH_EVERY: usize = 5;
 /// Relative difference of two consecutive best gains below which looking is saturated.
 pub const SATURATION: f32 = 0.02;
 
-/// The rule: look if `IGV > IGM + gamma Reg`, else push.
+/// The rule: look if `max(IGV, floor) > IGM + gamma Reg`, else push. In the paper the floor is 0.
 ///
 /// `reg` is at most 0, so a push that blurs what is known of the labels has to promise more.
-pub fn look_or_push(igv: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
-    if igv > igm + gamma * reg { Reason::LookTellsMore } else { Reason::PushTellsMore }
+pub fn look_or_push(igv: f32, floor: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
+    match igm + gamma * reg {
+        push if igv > push => Reason::LookTellsMore,
+        push if floor > push => Reason::PushTellsLittle,
+        _ => Reason::PushTellsMore,
+    }
 }
 
 /// Why no push is allowed in the next step of `budget`, or `None` if one is. Of several reasons the lasting ones are named
@@ -62,13 +66,17 @@ mod tests {
 
     #[test]
     fn the_rule_on_hand_made_numbers() {
-        assert_eq!(look_or_push(100.0, 90.0, 0.0, 0.2), Reason::LookTellsMore);
-        assert_eq!(look_or_push(90.0, 100.0, 0.0, 0.2), Reason::PushTellsMore);
-        assert_eq!(look_or_push(100.0, 100.0, 0.0, 0.2), Reason::PushTellsMore, "looking has to be better");
+        assert_eq!(look_or_push(100.0, 0.0, 90.0, 0.0, 0.2), Reason::LookTellsMore);
+        assert_eq!(look_or_push(90.0, 0.0, 100.0, 0.0, 0.2), Reason::PushTellsMore);
+        assert_eq!(look_or_push(100.0, 0.0, 100.0, 0.0, 0.2), Reason::PushTellsMore, "looking has to be better");
         // 90 > 100 + 0.2 * -60 = 88: the disturbance turns the choice.
-        assert_eq!(look_or_push(90.0, 100.0, -60.0, 0.2), Reason::LookTellsMore);
-        assert_eq!(look_or_push(90.0, 100.0, -60.0, 0.1), Reason::PushTellsMore);
-        assert_eq!(look_or_push(90.0, 100.0, -40.0, 0.2), Reason::PushTellsMore);
+        assert_eq!(look_or_push(90.0, 0.0, 100.0, -60.0, 0.2), Reason::LookTellsMore);
+        assert_eq!(look_or_push(90.0, 0.0, 100.0, -60.0, 0.1), Reason::PushTellsMore);
+        assert_eq!(look_or_push(90.0, 0.0, 100.0, -40.0, 0.2), Reason::PushTellsMore);
+        // Below the floor nothing is pushed, and that is the reason where looking is not.
+        assert_eq!(look_or_push(90.0, 95.0, 100.0, -40.0, 0.2), Reason::PushTellsLittle);
+        assert_eq!(look_or_push(90.0, 92.0, 100.0, -40.0, 0.2), Reason::PushTellsMore);
+        assert_eq!(look_or_push(93.0, 95.0, 100.0, -40.0, 0.2), Reason::LookTellsMore);
     }
 
     /// The guard of 20 steps after some actions.

@@ -342,7 +342,7 @@ fn disturbance_counts_blurred_labels_and_never_rewards() {
 
     // So does a floor, and patience.
     table.settings = PlannerSettings { push_floor: 1.1 * decision.igm, ..PlannerSettings::default() };
-    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
+    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::PushTellsLittle);
     table.settings = PlannerSettings { patience: 1.1 * decision.igm / decision.igv, ..PlannerSettings::default() };
     assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
 

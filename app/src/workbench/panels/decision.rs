@@ -110,7 +110,7 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
         };
         spark::bar(ui, &bar, if patience == 1.0 { 74.0 } else { 88.0 }, 72.0).on_hover_text(hint);
     };
-    let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsMore);
+    let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore);
     let (nats, of) = (words::nats(look), planner.counted.of_looks());
     let hint = if is_floor {
         format!("IGV: {of}, {nats}; a push has to promise {} at least", words::nats(asked))
@@ -150,7 +150,9 @@ fn because(reason: Reason, planner: &PlannerSettings) -> String {
         count => format!("nothing is pushed in the {which} {count} steps"),
     };
     match reason {
-        Reason::LookTellsMore | Reason::PushTellsMore | Reason::MapComplete => words::reason(reason).to_owned(),
+        Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore | Reason::MapComplete => {
+            words::reason(reason).to_owned()
+        }
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
         Reason::TooEarly => steps("first", planner.quiet_steps),
         Reason::LastStep => steps("last", planner.closing_steps),

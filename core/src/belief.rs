@@ -7,12 +7,14 @@
 mod carried;
 mod classical;
 mod floor;
+mod sightings;
 
 #[cfg(feature = "cnabu")]
 pub(crate) use carried::Carried;
 pub(crate) use carried::SOLID;
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
+pub use sightings::{CHANGED, LOOKS_TAKEN, NEWS_REACH_M, Sightings, look};
 
 use crate::arm::{Arm, Push};
 use crate::camera::MapObservation;
@@ -230,7 +232,12 @@ pub trait BeliefUpdate: Send + Sync {
         Ok(())
     }
 
-    /// The belief after an observation: `lambda' = sigma_o(lambda, o)`.
+    /// Whether beliefs wear when the same place is looked at again and again, so that [`look`] has to spare them.
+    fn wears(&self) -> bool {
+        false
+    }
+
+    /// The belief after an observation: `lambda' = sigma_o(lambda, o)`. Episodes go through [`look`].
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief;
 
     /// The beliefs that pushes are predicted to leave: `lambda' = sigma_m(lambda, push)`, one prediction per push.

@@ -1,7 +1,7 @@
 //! The real window: the binary under a virtual display, the pictures of every layout, the exported recording in the
 //! stock viewer. They need software Vulkan (Debian's mesa-vulkan-drivers) and Xvfb, which `make test-window` installs.
 
-use nudge_tests::{nudge_bin, nudge_ok, root, text, venv_tool};
+use nudge_tests::{nudge_bin, nudge_fails, nudge_ok, root, text, venv_tool};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -239,6 +239,9 @@ fn the_stock_viewer_verifies_and_shows_an_export() {
             assert!(printed.contains(entity), "{entity} is not in {}", recording.display());
         }
     }
+    let words = ["shot", alone.to_str().expect("utf-8"), "--out", "unwritten.png"];
+    let line = nudge_fails(2, &words);
+    assert!(line.contains("alone.rrd: is a recording") && line.contains("--picture"), "{line}");
     let picture = dir.path().join("stock.png");
     let output = Command::new(rerun)
         .args(["--port", "auto"])

@@ -64,6 +64,13 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     for path in std::iter::once(&args.open).chain(&args.with) {
         anyhow::ensure!(path.exists(), "{}: no such file or directory", path.display());
+        let recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("rrd"));
+        anyhow::ensure!(
+            !recording,
+            "{0}: is a recording, which has no layouts; `nudge open {0} --picture PNG` makes a picture of it, or name the \
+             episode's directory",
+            path.display()
+        );
     }
     anyhow::ensure!((0.5..=4.0).contains(&args.scale), "--scale {}: must be between 0.5 and 4", args.scale);
     let out = tempfile::tempdir()?;

@@ -162,6 +162,11 @@ impl BeliefUpdate for Cnabu {
         Layout::new(grid).map(|_| ())
     }
 
+    /// sigma_o learned to take in ten looks; by forty its map of what is seen has worn (RESULTS.md).
+    fn wears(&self) -> bool {
+        true
+    }
+
     /// A grid of other voxels than the networks' ([`BeliefUpdate::check_grid`] refuses it) is updated classically.
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief {
         let Ok(layout) = Layout::new(&belief.grid) else { return Classical.observe(belief, observation) };

@@ -4,7 +4,7 @@ use super::record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
 use crate::arm::{Arm, ArmTool, HandPose, Motion, Push, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
+use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, SweptPush, look};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet};
 use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
@@ -17,9 +17,6 @@ use crate::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
-
-/// Probability of change of a floor cell from which what was seen of it counts as unseen.
-const CHANGED: f32 = 0.1;
 
 /// A running episode. A clone is a branch: both go on independently from the same state.
 #[derive(Clone)]
@@ -39,8 +36,8 @@ pub struct Episode {
     belief: Arc<Belief>,
     truth: Arc<TruthMap>,
     history: History,
-    /// Voxels that looks have seen and that no push may have changed since.
-    seen: Arc<VoxelSet>,
+    /// What looks have seen and no push may have changed since.
+    sightings: Arc<Sightings>,
     record: EpisodeRecord,
     deciding: Stopwatch,
 }
@@ -96,7 +93,7 @@ impl Episode {
             belief,
             truth,
             history: History::default(),
-            seen: Arc::new(VoxelSet::empty(&grid)),
+            sightings: Arc::new(Sightings::none(&grid)),
             record,
             deciding: Stopwatch::default(),
         })
@@ -106,7 +103,10 @@ impl Episode {
     pub fn decide(&self) -> Decision {
         let started = Instant::now();
         let really_look = |view: ViewId| match self.views.view(view) {
-            Some(view) => self.update.observe(&self.belief, &self.observe(view).1),
+            Some(view) => {
+                let mut sightings = (*self.sightings).clone();
+                look(&*self.update, &self.belief, &self.observe(view).1, &mut sightings)
+            }
             None => (*self.belief).clone(),
         };
         let situation = Situation {
@@ -156,10 +156,8 @@ impl Episode {
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        self.belief = Arc::new(self.update.observe(&self.belief, &observation));
-        let seen = Arc::make_mut(&mut self.seen);
-        seen.union_with(&observation.free);
-        seen.union_with(&observation.occupied);
+        let sightings = Arc::make_mut(&mut self.sightings);
+        self.belief = Arc::new(look(&*self.update, &self.belief, &observation, sightings));
         let motion_s = motion.as_ref().map_or(0.0, Motion::duration_s);
         let happened = Happened { motion_s, ..Happened::default() };
         let record = self.file(decision, happened, started, seconds);
@@ -196,9 +194,9 @@ impl Episode {
         match &prediction {
             Some(prediction) => {
                 Arc::make_mut(&mut self.belief).apply(prediction);
-                self.forget_seen(prediction);
+                Arc::make_mut(&mut self.sightings).forget_changed(prediction);
             }
-            None => self.seen = Arc::new(VoxelSet::empty(&self.grid())),
+            None => self.sightings = Arc::new(Sightings::none(&self.grid())),
         }
         self.bodies = Arc::new(self.world.bodies());
         self.truth = Arc::new(TruthMap::of(&self.grid(), &self.bodies));
@@ -276,16 +274,6 @@ impl Episode {
             .flatten()
     }
 
-    /// What was seen of columns that a push may have changed is not seen any more.
-    fn forget_seen(&mut self, prediction: &PushPrediction) {
-        let grid = self.grid();
-        let seen = Arc::make_mut(&mut self.seen);
-        let cells = prediction.window.cells(&grid).zip(&prediction.change);
-        for (cell, _) in cells.filter(|(_, chance)| **chance > CHANGED) {
-            grid.column(cell).for_each(|voxel| seen.remove(voxel));
-        }
-    }
-
     /// What a view sees now, noise included: an oracle that asks sees what it will get.
     fn observe(&self, view: &View) -> (Image, MapObservation) {
         let (shelf, intrinsics) = (self.world.shelf(), &self.views.intrinsics);
@@ -344,7 +332,7 @@ impl Episode {
     /// The voxels that do not count as a gain, when only unseen ones do: those that looks have seen and that no push may
     /// have changed since.
     pub fn seen(&self) -> Option<&VoxelSet> {
-        (self.record.config.planner.counted == Counted::Unseen).then_some(&*self.seen)
+        (self.record.config.planner.counted == Counted::Unseen).then_some(self.sightings.seen())
     }
 
     /// The record so far, as `episode.json` keeps it.

@@ -1,5 +1,6 @@
 use super::super::synthetic;
 use super::*;
+use crate::belief::CHANGED;
 use crate::plan::{PlannerSettings, PolicyKind};
 use crate::score::Verdict;
 

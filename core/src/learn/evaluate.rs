@@ -2,7 +2,7 @@
 
 use super::{Dataset, MapSample, PushSample, PushedSample, VIEWS, VIEWS_AFTER, ViewSample};
 use crate::Result;
-use crate::belief::{Belief, BeliefUpdate, PushPrediction};
+use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, look};
 use crate::grid::{Grid, VoxelSet};
 use crate::score::Tally;
 use crate::world::TruthMap;
@@ -23,9 +23,9 @@ pub fn evaluate(
     for at in 0..data.len() {
         let sample = data.get(at)?;
         let truth = truth_map(&grid, &sample.truth, &sample.labels);
-        let mut belief = Belief::uniform(grid);
+        let (mut belief, mut sightings) = (Belief::uniform(grid), Sightings::none(&grid));
         for (tally, view) in tallies.iter_mut().zip(&sample.views) {
-            belief = update.observe(&belief, &view.observation);
+            belief = look(update, &belief, &view.observation, &mut sightings);
             tally.merge(&Tally::of(&belief, &truth));
         }
         progress(at + 1);
@@ -78,7 +78,7 @@ fn for_each_push(
 ) -> Result<()> {
     for at in 0..data.len() {
         let sample = data.get(at)?;
-        let belief = after_views(observe, &data.grid(), &sample.views);
+        let (belief, _) = after_views(observe, &data.grid(), &sample.views);
         let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
         for (pushed, prediction) in sample.pushes.iter().zip(predict.predict_pushes(&belief, &pushes)) {
             each(&sample, &belief, pushed, &prediction);
@@ -153,13 +153,14 @@ pub fn evaluate_after_pushes(
         let sample = data.get(at)?;
         let Some(pushed) = sample.pushes.first() else { continue };
         let truth = truth_map(&grid, &pushed.truth, &pushed.labels);
-        let mut belief = after_views(update, &grid, &sample.views);
+        let (mut belief, mut sightings) = after_views(update, &grid, &sample.views);
         for prediction in update.predict_pushes(&belief, std::slice::from_ref(&pushed.push)) {
             belief.apply(&prediction);
+            sightings.forget_changed(&prediction);
         }
         tallies[0].merge(&Tally::of(&belief, &truth));
         for (tally, view) in tallies[1..].iter_mut().zip(&sample.after) {
-            belief = update.observe(&belief, &view.observation);
+            belief = look(update, &belief, &view.observation, &mut sightings);
             tally.merge(&Tally::of(&belief, &truth));
         }
         progress(at + 1);
@@ -167,9 +168,12 @@ pub fn evaluate_after_pushes(
     Ok(tallies)
 }
 
-/// The belief after some views, from the uniform one.
-pub(super) fn after_views(update: &dyn BeliefUpdate, grid: &Grid, views: &[ViewSample]) -> Belief {
-    views.iter().fold(Belief::uniform(*grid), |belief, view| update.observe(&belief, &view.observation))
+/// The belief after some views, from the uniform one, and what they have seen.
+pub(super) fn after_views(update: &dyn BeliefUpdate, grid: &Grid, views: &[ViewSample]) -> (Belief, Sightings) {
+    let begin = (Belief::uniform(*grid), Sightings::none(grid));
+    views.iter().fold(begin, |(belief, mut sightings), view| {
+        (look(update, &belief, &view.observation, &mut sightings), sightings)
+    })
 }
 
 /// A truth without objects' numbers.

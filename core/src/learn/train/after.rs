@@ -60,7 +60,7 @@ impl AfterPushes {
 
 /// What is believed of a sample after its views and the prediction of its first push.
 fn believed(layout: &Layout, sample: &PushSample, update: &Cnabu) -> Evidence {
-    let mut belief = after_views(update, layout.grid(), &sample.views);
+    let (mut belief, _) = after_views(update, layout.grid(), &sample.views);
     let first: Vec<SweptPush> = sample.pushes.iter().take(1).map(|pushed| pushed.push.clone()).collect();
     for prediction in update.predict_pushes(&belief, &first) {
         belief.apply(&prediction);

@@ -39,7 +39,7 @@ impl Sightings {
     }
 
     /// Takes down what a look sees.
-    pub fn add(&mut self, observation: &MapObservation) {
+    fn add(&mut self, observation: &MapObservation) {
         self.seen.union_with(&observation.occupied);
         self.seen.union_with(&observation.free);
     }

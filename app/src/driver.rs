@@ -10,6 +10,7 @@ use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical};
 use nudge_core::cnabu;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Observer, Overwrite, StepOutcome, resume};
+use nudge_core::files::{remove_if_there, temporary_of};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::{Body, Catalog, Scene};
 use nudge_core::world::TruthMap;
@@ -93,7 +94,7 @@ impl Driver {
     }
 
     /// Goes on with the episode in `out`: repeats and verifies its log, and records it anew on the way.
-    /// `watch` is shown the prior and every repeated step.
+    /// `watch` is shown the prior and every repeated step. Where it is refused, the recording is as it was.
     ///
     /// # Errors
     /// What [`resume`] refuses.
@@ -103,19 +104,26 @@ impl Driver {
         update: Arc<dyn BeliefUpdate>,
         watch: Observer<'_>,
     ) -> Result<Self> {
+        // Beside the old recording, which stays unless the whole log leads where it says.
+        let anew = temporary_of(&out.join(RECORDING));
         let mut begun: Option<(Recorder, Story)> = None;
-        let (directory, episode) = resume(out, catalog, update, &mut |episode, outcome| {
+        let resumed = resume(out, catalog, update, &mut |episode, outcome| {
             if let (Some((recorder, story)), Some(outcome)) = (&mut begun, outcome) {
                 recorder.step(episode, outcome)?;
                 story.note(episode);
             } else {
-                let mut recorder = Recorder::create(&out.join(RECORDING), episode)?;
+                let mut recorder = Recorder::create(&anew, episode)?;
                 recorder.prior(episode)?;
                 begun = Some((recorder, Story::new(episode)));
             }
             watch(episode, outcome)
-        })?;
-        let (recorder, story) = begun.ok_or_else(|| Error::input(out, "", "holds no prior to go on from"))?;
+        });
+        if resumed.is_err() && begun.is_some() {
+            let _ = remove_if_there(&anew);
+        }
+        let (directory, episode) = resumed?;
+        let (mut recorder, story) = begun.ok_or_else(|| Error::input(out, "", "holds no prior to go on from"))?;
+        recorder.move_to(&out.join(RECORDING))?;
         Ok(Self { episode, directory, recorder, story })
     }
 

@@ -181,6 +181,13 @@ impl Recorder {
         Ok(())
     }
 
+    /// Gives the file another name, in the same folder; what is there is replaced, and recording goes on.
+    pub fn move_to(&mut self, path: &Path) -> Result<()> {
+        std::fs::rename(&self.file, path).map_err(|error| Error::io(path, error))?;
+        self.file = path.to_owned();
+        Ok(())
+    }
+
     /// Where the chosen action's gain comes from: the look's under the belief, the push's under its prediction.
     fn gain_of_voxels(&self, setting: &Setting<'_>, outcome: &StepOutcome) -> Vec<(usize, f32)> {
         let Some(field) = &self.field else { return Vec::new() };

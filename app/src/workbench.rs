@@ -13,6 +13,7 @@ pub mod command;
 pub mod derive;
 pub mod dialog;
 pub mod export;
+pub mod file_kind;
 pub mod half_belief;
 pub mod latest;
 pub mod menu;
@@ -37,7 +38,7 @@ use rerun::external::egui;
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// When there is no display.
+/// When there is no display, or no temporary folder for a window that remembers nothing.
 pub fn run(options: app::Options) -> Result<(), String> {
     let mut native = rerun::external::re_viewer::native::eframe_options(None);
     native.viewport = egui::ViewportBuilder::default()
@@ -45,6 +46,9 @@ pub fn run(options: app::Options) -> Result<(), String> {
         .with_title("Nudge")
         .with_inner_size([1440.0, 900.0])
         .with_min_inner_size([900.0, 560.0]);
+    // What remembers nothing begins like the first time, and leaves no trace: eframe keeps the sizes of panels by itself.
+    let scratch = if options.remember { None } else { Some(tempfile::tempdir().map_err(|error| error.to_string())?) };
+    native.persistence_path = scratch.as_ref().map(|folder| folder.path().join("app.ron"));
     let threads = options.threads.clone();
     let closed =
         eframe::run_native("Nudge", native, Box::new(move |cc| Ok(Box::new(app::App::new(cc, options.clone())))));

@@ -35,7 +35,8 @@ fn write_and_rename(temporary: &Path, path: &Path, bytes: &[u8]) -> std::io::Res
     cut::point()
 }
 
-fn temporary_of(path: &Path) -> PathBuf {
+/// What the file or folder that is to stand at `path` is called until it is whole.
+pub fn temporary_of(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{TEMPORARY}{name}"))
 }

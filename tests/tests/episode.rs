@@ -103,6 +103,48 @@ fn a_killed_run_opens_and_resumes_to_the_same_end() {
 }
 
 #[test]
+fn an_episode_that_cannot_be_resumed_stays_as_it_is() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("e");
+    run(&out, &["--budget", "3"]);
+    let document = out.join("episode.json");
+    let mut record: Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["steps"][1]["displacement_m"] = 0.5.into();
+    std::fs::write(&document, record.to_string()).expect("as if another version had written it");
+    let files = || -> Vec<(std::path::PathBuf, Vec<u8>)> {
+        let mut paths: Vec<_> =
+            std::fs::read_dir(&out).expect("listed").map(|entry| entry.expect("entry").path()).collect();
+        paths.sort();
+        paths
+            .into_iter()
+            .filter(|path| path.is_file())
+            .map(|path| (path.clone(), std::fs::read(path).expect("read")))
+            .collect()
+    };
+    let before = files();
+    let line = nudge_fails(
+        1,
+        &[
+            "run",
+            SCENE,
+            "--policy",
+            "mem",
+            "--belief",
+            "classical",
+            "--seed",
+            "1",
+            "--resume",
+            "--budget",
+            "3",
+            "--out",
+            out.to_str().expect("utf-8"),
+        ],
+    );
+    assert!(line.contains("cannot be resumed: step 2: displacement_m: 0.5 in the log, 0.0 now"), "{line}");
+    assert!(files() == before, "recording, figure and log are those of before, and nothing is left over");
+}
+
+#[test]
 fn the_number_of_threads_changes_nothing() {
     let dir = tempfile::tempdir().expect("tempdir");
     let of = |threads: &str| {

@@ -2,7 +2,7 @@
 
 use super::plan::Plan;
 use super::store::BenchDir;
-use nudge_core::files::TEMPORARY;
+use nudge_core::files::temporary_of;
 use nudge_core::shard::Shard;
 use nudge_core::{Error, Result};
 use std::collections::BTreeMap;
@@ -34,8 +34,7 @@ pub fn merge(parts: &[PathBuf], out: &Path) -> Result<Plan> {
             return Err(Error::input(part, "", message));
         }
     }
-    let name = out.file_name().unwrap_or_default().to_string_lossy();
-    let partial = out.with_file_name(format!("{TEMPORARY}{name}"));
+    let partial = temporary_of(out);
     let written = write(&partial, &whole, shards.into_values());
     if written.is_err() {
         let _ = fs::remove_dir_all(&partial);

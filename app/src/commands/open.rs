@@ -1,6 +1,7 @@
 //! `nudge` and `nudge open FILE`: the workbench.
 
 use crate::workbench::app::FormOptions;
+use crate::workbench::file_kind::FileKind;
 use anyhow::Context;
 use nudge_core::plan::PolicyKind;
 use std::path::PathBuf;
@@ -39,7 +40,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         anyhow::bail!("{}: no such file or directory", file.display());
     }
     if let (Some(file), Some(_)) = (&args.file, &args.picture)
-        && file.extension().is_some_and(|extension| extension == "toml")
+        && FileKind::of(file) == FileKind::Scene
     {
         // Nobody would see the message in the window.
         nudge_core::scene::Scene::load(file, &nudge_core::scene::Catalog::standard())?;

@@ -1,5 +1,6 @@
 //! `nudge shot`: the workbench's window as a picture, without a display.
 
+use crate::workbench::file_kind::FileKind;
 use crate::workbench::model::LayoutKind;
 use crate::workbench::shot::{Shot, shoot};
 use std::path::PathBuf;
@@ -64,9 +65,8 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     for path in std::iter::once(&args.open).chain(&args.with) {
         anyhow::ensure!(path.exists(), "{}: no such file or directory", path.display());
-        let recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("rrd"));
         anyhow::ensure!(
-            !recording,
+            FileKind::of(path) != FileKind::Recording,
             "{0}: is a recording, which has no layouts; `nudge open {0} --picture PNG` makes a picture of it, or name the \
              episode's directory",
             path.display()

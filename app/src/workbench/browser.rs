@@ -1,6 +1,7 @@
 //! The scenes there are to choose from: files below a folder and those that were opened lately, looked at in the
 //! background, with a picture and how many objects no view shows.
 
+use super::file_kind::FileKind;
 use super::latest::Wake;
 use crate::picture::{self, RgbImage, View};
 use nudge_core::camera::{ViewArray, hidden_objects};
@@ -261,7 +262,9 @@ fn files(folder: &Path, recent: &[PathBuf]) -> Vec<(PathBuf, String, Option<Syst
     let known: BTreeSet<PathBuf> = found.iter().filter_map(|path| path.canonicalize().ok()).collect();
     let changed = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
     let elsewhere = recent.iter().filter(|path| {
-        is_scene(path) && path.is_file() && path.canonicalize().is_ok_and(|path| !known.contains(&path))
+        FileKind::of(path) == FileKind::Scene
+            && path.is_file()
+            && path.canonicalize().is_ok_and(|path| !known.contains(&path))
     });
     let group = |path: &Path| path.parent().map_or(String::new(), |parent| parent.display().to_string());
     let listed = found.iter().map(|path| (path.clone(), group(path), changed(path)));
@@ -277,12 +280,8 @@ fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
         }
         if path.is_dir() && depth < DEPTH && found.len() < MOST {
             search(&path, depth + 1, found);
-        } else if is_scene(&path) && path.is_file() {
+        } else if FileKind::of(&path) == FileKind::Scene && path.is_file() {
             found.push(path);
         }
     }
-}
-
-fn is_scene(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension == "toml")
 }

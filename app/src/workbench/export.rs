@@ -17,7 +17,7 @@ use crate::record::{self, Recorder, Setting, State};
 use image::{ImageBuffer, Pixel, PixelWithColorType};
 use nudge_core::belief::Belief;
 use nudge_core::episode::{EpisodeDir, EpisodeRecord};
-use nudge_core::files::{TEMPORARY, names_in, write_atomically};
+use nudge_core::files::{names_in, temporary_of, write_atomically};
 use nudge_core::{Error, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -97,11 +97,11 @@ pub fn enlarged<P: Pixel<Subpixel = u8>>(picture: &ImageBuffer<P, Vec<u8>>, scal
 
 /// A name beside `path` for what is not whole yet.
 fn beside(path: &Path) -> Result<PathBuf> {
-    let name = path.file_name().ok_or_else(|| Error::input(path, "", "names no file"))?.to_string_lossy();
+    path.file_name().ok_or_else(|| Error::input(path, "", "names no file"))?;
     if let Some(parent) = path.parent().filter(|parent| *parent != Path::new("")) {
         fs::create_dir_all(parent).map_err(|error| Error::io(parent, error))?;
     }
-    Ok(path.with_file_name(format!("{TEMPORARY}{name}")))
+    Ok(temporary_of(path))
 }
 
 /// `episode.json` as far as the session has come.

@@ -311,12 +311,19 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
             let record = EpisodeDir::open(&path)?.record()?;
             let update = update_named(&record.config.belief, &record.config)?;
             let of = record.steps.len();
-            let mut moments = Vec::with_capacity(of + 1);
+            let look = |why: String| {
+                let mut moments = Vec::with_capacity(of + 1);
+                let (episode, difference) =
+                    review(&path, catalog.clone(), update.clone(), &mut watch(post, brake, of, &mut moments))?;
+                let reason = difference.map_or(why, |difference| {
+                    format!("its actions lead elsewhere when repeated here ({difference}); shown is what it holds")
+                });
+                Ok((Track::Reading, opened(&path, &episode, moments, Some(reason))?))
+            };
             if look_only {
-                let episode = review(&path, catalog, update, &mut watch(post, brake, of, &mut moments))?;
-                let reason = Some("nothing in its directory shall change".to_owned());
-                return Ok((Track::Reading, opened(&path, &episode, moments, reason)?));
+                return look("nothing in its directory shall change".to_owned());
             }
+            let mut moments = Vec::with_capacity(of + 1);
             let resumed =
                 Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, brake, of, &mut moments));
             match resumed {
@@ -324,12 +331,8 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
                     let opened = opened(&path, driver.episode(), moments, None)?;
                     Ok((Track::Writing(Box::new(driver)), opened))
                 }
-                Err(refused @ (Error::Io { .. } | Error::Input { .. })) => {
-                    // A directory that cannot be written, or that another run is writing, can still be looked at.
-                    moments.clear();
-                    let episode = review(&path, catalog, update, &mut watch(post, brake, of, &mut moments))?;
-                    Ok((Track::Reading, opened(&path, &episode, moments, Some(refused.to_string()))?))
-                }
+                // What cannot be written, is being written by another run, or is of another version or machine.
+                Err(refused @ (Error::Io { .. } | Error::Input { .. } | Error::Check(_))) => look(refused.to_string()),
                 Err(error) => Err(error),
             }
         }

@@ -1,5 +1,6 @@
 //! The episode as a state machine.
 
+use super::npz::StoredTruth;
 use super::record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
@@ -322,6 +323,22 @@ impl Episode {
     /// Takes the seconds and the version of a log whose actions this episode has repeated.
     pub(super) fn adopt_log(&mut self, logged: EpisodeRecord) {
         self.record = logged;
+    }
+
+    /// Takes prior or last step of a log, with what is filed of belief and truth, in place of what repeating them led to.
+    pub(super) fn adopt_state(&mut self, logged: &EpisodeRecord, belief: Belief, truth: StoredTruth) {
+        self.record.prior = logged.prior;
+        if let Some(step) = self.record.steps.last_mut() {
+            *step = logged.steps[step.index - 1].clone();
+        }
+        self.belief = Arc::new(belief);
+        // Which object stands where is not filed, so outlines on the floor stay those of the repeated truth.
+        self.truth = Arc::new(TruthMap {
+            dims: truth.dims,
+            occupancy: truth.occupancy,
+            labels: truth.labels,
+            objects: self.truth.objects.clone(),
+        });
     }
 
     /// Whether the budget is used up.

@@ -128,8 +128,8 @@ impl Comparison {
         Self { tolerance, step: 0, largest: 0.0, differences: Vec::new() }
     }
 
-    pub(super) fn first_difference(&self) -> Option<&Difference> {
-        self.differences.first()
+    pub(super) fn into_first_difference(self) -> Option<Difference> {
+        self.differences.into_iter().next()
     }
 
     fn agreement(&self) -> Agreement {

@@ -1,7 +1,7 @@
 use super::super::npz;
-use super::super::resume;
 use super::super::synthetic;
 use super::super::{Overwrite, Precision};
+use super::super::{resume, review};
 use super::*;
 use crate::belief::Classical;
 use crate::plan::{Action, PolicyKind};
@@ -156,6 +156,53 @@ fn an_episode_resumes_and_replays_to_the_bit() {
     let error = replayed(&path).expect_err("damaged");
     assert_eq!(error.exit_code(), 2);
     assert!(error.to_string().starts_with(&file.display().to_string()), "{error}");
+}
+
+#[test]
+fn who_only_looks_is_shown_what_is_filed_and_told_where_it_parts_from_what_is() {
+    let root = tempdir().expect("a temporary directory");
+    let path = root.path().join("episode");
+    let first = run(&path, BUDGET);
+    let reviewed = |watch: &mut dyn FnMut(&Episode, Option<&StepRecord>)| {
+        review(&path, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |episode, outcome| {
+            watch(episode, outcome.map(|outcome| &outcome.record));
+            Ok(())
+        })
+        .expect("reviewed")
+    };
+    let (whole, difference) = reviewed(&mut |_, _| {});
+    assert!(difference.is_none() && whole.belief() == first.belief(), "what agrees is as exact as it was made");
+
+    // As if another version had written steps 3 and 5.
+    let directory = EpisodeDir::open(&path).expect("opens");
+    let mut record = directory.record().expect("a record");
+    record.steps[2].scores.semantic_miou = 0.125;
+    fs::write(path.join("episode.json"), record.to_json()).expect("written");
+    let mut belief = directory.read_belief(3).expect("a belief");
+    belief.semantics[17][2] += 0.5;
+    fs::write(directory.belief_path(3), npz::belief_archive(&belief, Precision::Half)).expect("written");
+    let mut truth = first.truth().clone();
+    truth.occupancy[1234] ^= 1;
+    fs::write(directory.truth_path(5), npz::truth_archive(&truth)).expect("written");
+    let mut shown = Vec::new();
+    let (whole, difference) = reviewed(&mut |episode, step| {
+        let score = step.map_or(episode.record().prior, |step| step.scores).semantic_miou;
+        shown.push((episode.belief().semantics[17][2], score, episode.truth().occupancy[1234]));
+    });
+    let words = difference.expect("told").to_string();
+    assert!(words.starts_with("step 3: scores.semantic_miou: 0.125 in the log, "), "{words}");
+    assert_eq!((shown[3].0, shown[3].1), (belief.semantics[17][2], 0.125));
+    let occupied = first.truth().occupancy[1234];
+    assert_eq!([shown[0].2, shown[4].2, shown[5].2], [occupied, occupied, occupied ^ 1]);
+    assert_eq!((shown.len(), whole.record()), (BUDGET + 1, &record));
+    assert_eq!(names_of(&path), ["beliefs", "episode.json", "truth"]);
+}
+
+/// What is in a folder, by name.
+fn names_of(path: &Path) -> Vec<String> {
+    let mut names = crate::files::names_in(path).expect("listed");
+    names.sort();
+    names
 }
 
 #[test]

@@ -1,9 +1,9 @@
-//! Going on with an episode whose run was stopped.
+//! Opening an episode again: to go on with a run that was stopped, or to look at it.
 
 use super::directory::EpisodeDir;
 use super::machine::Episode;
 use super::record::StepOutcome;
-use super::replay::Comparison;
+use super::replay::{Comparison, Difference};
 use crate::belief::BeliefUpdate;
 use crate::scene::Catalog;
 use crate::{Error, Result};
@@ -27,33 +27,47 @@ pub fn resume(
     observer: Observer<'_>,
 ) -> Result<(EpisodeDir, Episode)> {
     let directory = EpisodeDir::open_to_write(path.as_ref())?;
-    let episode = retrace(&directory, catalog, update, observer)?;
+    let (episode, _) = retrace(&directory, catalog, update, Departure::Refused, observer)?;
     Ok((directory, episode))
 }
 
-/// Opens the episode in `path` to look at it: the same as [`resume`], but nothing is locked or written.
+/// Opens the episode in `path` to look at it: nothing is locked or written. Where the repeated actions do not lead where
+/// the log says (it was written by another version, or on another machine), the filed step, belief and truth stand in
+/// place of the repeated ones, and the first such place is told beside the episode. Bodies and images remain the
+/// repeated ones.
 ///
 /// # Errors
-/// Those of [`resume`].
+/// Those of [`resume`] but for [`Error::Check`], and [`Error::Usage`] for an action of the log that cannot be repeated.
 pub fn review(
     path: impl AsRef<Path>,
     catalog: Arc<Catalog>,
     update: Arc<dyn BeliefUpdate>,
     observer: Observer<'_>,
-) -> Result<Episode> {
-    retrace(&EpisodeDir::open(path.as_ref())?, catalog, update, observer)
+) -> Result<(Episode, Option<Difference>)> {
+    retrace(&EpisodeDir::open(path.as_ref())?, catalog, update, Departure::Overruled, observer)
+}
+
+/// What to do where repeated actions do not lead where the log says.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Departure {
+    /// End with an error.
+    Refused,
+    /// Go on from what is filed.
+    Overruled,
 }
 
 fn retrace(
     directory: &EpisodeDir,
     catalog: Arc<Catalog>,
     update: Arc<dyn BeliefUpdate>,
+    departure: Departure,
     observer: Observer<'_>,
-) -> Result<Episode> {
+) -> Result<(Episode, Option<Difference>)> {
     let logged = directory.record()?;
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
-    let mut comparison = Comparison::new(0.0);
+    let mut first = None;
     for done in 0..=logged.steps.len() {
+        let mut comparison = Comparison::new(0.0);
         let mut outcome = None;
         if let Some(step) = done.checked_sub(1).map(|at| &logged.steps[at]) {
             let repeated = episode.act(step.decision.clone())?;
@@ -63,12 +77,19 @@ fn retrace(
             comparison.prior(&logged, episode.record());
         }
         comparison.arrays(directory, &logged, done, &episode)?;
-        if let Some(difference) = comparison.first_difference() {
-            let place = directory.path().display();
-            return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
+        if let Some(difference) = comparison.into_first_difference() {
+            if departure == Departure::Refused {
+                let place = directory.path().display();
+                return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
+            }
+            episode.adopt_state(&logged, directory.read_belief(done)?, directory.read_truth(done)?);
+            if let Some(outcome) = &mut outcome {
+                outcome.record = logged.steps[done - 1].clone();
+            }
+            first.get_or_insert(difference);
         }
         observer(&episode, outcome.as_ref())?;
     }
     episode.adopt_log(logged);
-    Ok(episode)
+    Ok((episode, first))
 }

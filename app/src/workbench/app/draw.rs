@@ -286,6 +286,8 @@ fn tooltip(ctx: &egui::Context, entry: MenuCommand) -> String {
 
 fn scrolled(ui: &mut egui::Ui, id: &str, content: impl FnOnce(&mut egui::Ui)) {
     egui::ScrollArea::vertical().id_salt(id).auto_shrink(false).show(ui, |ui| {
+        // Room for the bar, which floats over what is at the edge.
+        ui.set_max_width(ui.available_width() - 4.0);
         ui.add_space(4.0);
         content(ui);
     });

@@ -5,6 +5,7 @@ use crate::workbench::annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::Dialog;
 use crate::workbench::export;
+use crate::workbench::file_kind::FileKind;
 use crate::workbench::model::LayoutKind;
 use crate::workbench::session::{Session, SessionId};
 use crate::workbench::threads;
@@ -19,22 +20,23 @@ const RECENT: usize = 12;
 impl App {
     /// Opens a scene, an episode's directory or a recording; what it is none of becomes a message.
     pub(super) fn open(&mut self, path: &Path) {
-        let is = |extension: &str| path.extension().is_some_and(|other| other.eq_ignore_ascii_case(extension));
-        if is("toml") {
-            let opened =
-                if self.model.kept.layout == LayoutKind::Author { self.edit(path) } else { self.start(path, None) };
-            if opened {
-                self.remember(path);
+        match FileKind::of(path) {
+            FileKind::Scene => {
+                let opened =
+                    if self.model.kept.layout == LayoutKind::Author { self.edit(path) } else { self.start(path, None) };
+                if opened {
+                    self.remember(path);
+                }
             }
-        } else if is("rrd") {
-            self.open_recording(path);
-        } else {
-            let directory = if path.is_file() { path.parent().unwrap_or(path) } else { path };
-            if directory.join("episode.json").is_file() {
-                self.open_episode(directory);
-            } else {
-                let message = "is neither a scene (.toml), nor an episode's directory, nor a recording (.rrd)";
-                self.tell(Level::Error, format!("{}: {message}", path.display()));
+            FileKind::Recording => self.open_recording(path),
+            FileKind::Other => {
+                let directory = if path.is_file() { path.parent().unwrap_or(path) } else { path };
+                if directory.join("episode.json").is_file() {
+                    self.open_episode(directory);
+                } else {
+                    let message = "is neither a scene (.toml), nor an episode's directory, nor a recording (.rrd)";
+                    self.tell(Level::Error, format!("{}: {message}", path.display()));
+                }
             }
         }
     }

@@ -1,14 +1,28 @@
 //! What only happens when something breaks, driven through the window. The rest is tested from outside, in `tests/`.
 
-use super::{App, Options};
+use super::{App, Options, Part};
 use crate::workbench::command::Command;
 use crate::workbench::dialog::Dialog;
+use crate::workbench::model::LayoutKind;
 use crate::workbench::session::Activity;
 use crate::workbench::worker::Order;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use std::path::Path;
 use std::time::{Duration, Instant};
+
+/// A window whose episodes go to `folder`, with the first-look scene of the demonstration opened for `budget` actions.
+fn window(folder: &Path, budget: usize) -> Harness<'static, App> {
+    let options = Options { out: folder.join("out"), ..Options::default() };
+    let mut harness = Harness::builder()
+        .with_size([1440.0, 900.0])
+        .build_eframe(move |cc| App::without_viewer(&cc.egui_ctx, options.clone()));
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/demo/first-look.toml");
+    harness.state_mut().model.kept.form.budget = budget;
+    harness.state_mut().ask(Command::Open(scene));
+    wait(&mut harness);
+    harness
+}
 
 fn wait(harness: &mut Harness<'_, App>) {
     let started = Instant::now();
@@ -26,14 +40,7 @@ fn wait(harness: &mut Harness<'_, App>) {
 #[test]
 fn a_worker_that_panics_leaves_the_window_and_a_way_to_go_on() {
     let folder = tempfile::tempdir().expect("folder");
-    let options = Options { out: folder.path().join("out"), ..Options::default() };
-    let mut harness = Harness::builder()
-        .with_size([1440.0, 900.0])
-        .build_eframe(move |cc| App::without_viewer(&cc.egui_ctx, options.clone()));
-    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/demo/first-look.toml");
-    harness.state_mut().model.kept.form.budget = 3;
-    harness.state_mut().ask(Command::Open(scene));
-    wait(&mut harness);
+    let mut harness = window(folder.path(), 3);
     for _ in 0..2 {
         harness.state_mut().ask(Command::DoIt);
         wait(&mut harness);
@@ -71,4 +78,51 @@ fn a_worker_that_panics_leaves_the_window_and_a_way_to_go_on() {
     harness.state_mut().ask(Command::Run);
     wait(&mut harness);
     assert_eq!(harness.state().model.session().expect("open").steps(), 3);
+}
+
+#[test]
+fn an_episode_of_another_version_is_shown_as_it_is_filed() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 2);
+    harness.state_mut().ask(Command::Run);
+    wait(&mut harness);
+    let (id, path) = harness.state().model.session().map(|session| (session.id, session.path.clone())).expect("open");
+    harness.state_mut().ask(Command::Close(id));
+    harness.run_steps(3);
+
+    let document = path.join("episode.json");
+    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["steps"][0]["scores"]["semantic_miou"] = 0.125.into();
+    std::fs::write(&document, record.to_string()).expect("as if another version had written it");
+    harness.state_mut().ask(Command::Open(path.clone()));
+    harness.run_steps(3);
+    wait(&mut harness);
+    let session = harness.state().model.session().expect("shown all the same");
+    let reason = session.read_only.as_deref().expect("to look at only");
+    assert!(reason.contains("step 1: scores.semantic_miou: 0.125 in the log"), "{reason}");
+    assert_eq!((session.path.clone(), session.steps()), (path, 2));
+    assert_eq!(session.moments[1].scores.semantic_miou, 0.125);
+}
+
+#[test]
+fn panels_stay_as_wide_as_they_were_made() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 2);
+    let widths = |harness: &Harness<'_, App>| -> Vec<(Part, f32)> {
+        harness.state().parts.iter().map(|(part, rect)| (*part, rect.width())).collect()
+    };
+    let opened = widths(&harness);
+    harness.state_mut().ask(Command::Run);
+    wait(&mut harness);
+    assert_eq!(widths(&harness), opened, "after a run");
+    for layout in LayoutKind::ALL {
+        harness.state_mut().model.kept.layout = layout;
+        harness.run_steps(1);
+        let first = widths(&harness);
+        for step in [2, 1, 0] {
+            harness.state_mut().model.cursor = step;
+            harness.run_steps(40);
+            assert_eq!(widths(&harness), first, "{layout:?}, step {step}");
+        }
+    }
 }

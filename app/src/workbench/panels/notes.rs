@@ -8,7 +8,7 @@ use crate::workbench::command::Command;
 use crate::workbench::model::Model;
 use crate::workbench::session::Session;
 use nudge_core::score::Verdict;
-use rerun::external::egui::{self, Align, Layout, RichText};
+use rerun::external::egui::{self, Align, Color32, Layout, RichText};
 
 /// How much of a note the list shows.
 const EXCERPT: usize = 80;
@@ -81,12 +81,13 @@ fn verdicts(ui: &mut egui::Ui, session: &Session, step: usize, ask: &mut Vec<Com
     let judged = session.annotations.judge(step, &outcome.record.objects);
     totals(ui, &judged);
     ui.add_space(4.0);
-    egui::Grid::new(("verdicts", session.id)).num_columns(2).striped(true).spacing([10.0, 4.0]).show(ui, |ui| {
-        for judged in &judged {
-            row(ui, step, judged, ask);
-            ui.end_row();
-        }
-    });
+    ui.spacing_mut().item_spacing.y = 0.0;
+    for (at, judged) in judged.iter().enumerate() {
+        let fill = if at % 2 == 1 { ui.visuals().faint_bg_color } else { Color32::TRANSPARENT };
+        egui::Frame::new().fill(fill).inner_margin(egui::vec2(0.0, 1.0)).show(ui, |ui| {
+            ui.horizontal(|ui| row(ui, step, judged, ask));
+        });
+    }
 }
 
 fn totals(ui: &mut egui::Ui, judged: &[Judged]) {
@@ -97,7 +98,8 @@ fn totals(ui: &mut egui::Ui, judged: &[Judged]) {
             if at > 0 {
                 ui.weak("·");
             }
-            ui.label(format!("{} {}", count(verdict), verdict_title(verdict)));
+            // A number and its words stay on one line.
+            ui.label(format!("{} {}", count(verdict), verdict_title(verdict)).replace(' ', "\u{a0}"));
         }
         let overruled = judged.iter().filter(|judged| judged.overruled.is_some()).count();
         if overruled > 0 {

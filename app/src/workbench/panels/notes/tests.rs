@@ -75,14 +75,14 @@ fn an_overruled_verdict_is_marked_and_counted() {
         .clone();
     let wrong = objects.iter().find(|object| object.verdict != Verdict::Found).expect("one that was not found");
     let found = objects.iter().filter(|object| object.verdict == Verdict::Found).count();
-    assert!(has(&harness, &format!("{found} found")));
+    assert!(has(&harness, &format!("{found}\u{a0}found")));
     harness.get_by_label(&format!("Verdict on {}", object_name(wrong))).click();
     harness.run_steps(3);
     let choices: Vec<_> = harness.query_all_by_label("found").collect();
     choices.last().expect("a choice").click();
     drop(choices);
     harness.run_steps(3);
-    assert!(has(&harness, &format!("{} found", found + 1)), "{:?}", harness.state().asked);
+    assert!(has(&harness, &format!("{}\u{a0}found", found + 1)), "{:?}", harness.state().asked);
     assert!(has(&harness, "1 overruled") && has(&harness, "✎"));
 }
 

@@ -174,18 +174,26 @@ pub const BELIEFS: [&str; 2] = [CLASSICAL, CNABU];
 /// # Errors
 /// [`Error::Usage`] for a name that is unknown, or asked for but not there; what is wrong with the networks' weights.
 pub fn belief_update(named: Option<&str>, policy: PolicyKind) -> Result<(Arc<dyn BeliefUpdate>, Option<String>)> {
-    match named.unwrap_or_else(|| policy.default_belief()) {
-        CLASSICAL => Ok((Arc::new(Classical), None)),
-        CNABU => match (networks(), named) {
-            (Ok(update), _) => Ok((update, None)),
+    let name = named.unwrap_or_else(|| policy.default_belief());
+    match (update_of(name)?, named) {
+        (Ok(update), _) => Ok((update, None)),
+        (Err(why), None) => Ok((Arc::new(Classical), Some(format!("{why}: {policy} runs on the classical belief")))),
+        (Err(why), Some(_)) => Err(Error::Usage(format!("--belief {name}: {why}; use classical"))),
+    }
+}
+
+/// The belief update of a name, or why this program has none although it knows the name.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown name; what is wrong with the networks' weights, where they are there.
+pub fn update_of(name: &str) -> Result<std::result::Result<Arc<dyn BeliefUpdate>, &'static str>> {
+    match name {
+        CLASSICAL => Ok(Ok(Arc::new(Classical))),
+        CNABU => match networks() {
+            Ok(update) => Ok(Ok(update)),
             // Broken weights are an error even for who did not ask for them; that there are none is not.
-            (Err(NoNetworks::Broken(error)), _) => Err(error),
-            (Err(NoNetworks::Missing(why)), None) => {
-                Ok((Arc::new(Classical), Some(format!("{why}: {policy} runs on the classical belief"))))
-            }
-            (Err(NoNetworks::Missing(why)), Some(_)) => {
-                Err(Error::Usage(format!("--belief cnabu: {why}; use classical")))
-            }
+            Err(NoNetworks::Broken(error)) => Err(error),
+            Err(NoNetworks::Missing(why)) => Ok(Err(why)),
         },
         other => Err(Error::Usage(format!("unknown belief \"{other}\"; there are classical, cnabu"))),
     }

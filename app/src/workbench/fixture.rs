@@ -66,7 +66,7 @@ impl Script {
         let setup = Setup {
             catalog,
             views: Arc::new(episode.views().clone()),
-            update,
+            update: Some(update),
             arm: episode.arm().clone(),
             unreachable: Arc::new(episode.unreachable_views().to_vec()),
             hidden: Arc::new(vec!["tomato_can#1".to_owned()]),
@@ -167,7 +167,7 @@ pub fn answer(model: &mut Model) {
     let preview = push.map(|push| {
         let swept = swept_by(&session.setup.arm, &belief, &push);
         let pushes = [SweptPush { push, swept: swept.clone() }];
-        let prediction = session.setup.update.predict_pushes(&belief, &pushes).remove(0);
+        let prediction = session.setup.update.as_ref().expect("an update").predict_pushes(&belief, &pushes).remove(0);
         Preview { of: (session.id, step), push, prediction: Arc::new(prediction), swept: Arc::new(swept) }
     });
     let source = model.view.map(|view| {

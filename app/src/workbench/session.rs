@@ -72,8 +72,8 @@ pub struct Setup {
     pub catalog: Arc<Catalog>,
     /// The candidate views.
     pub views: Arc<ViewArray>,
-    /// How beliefs change.
-    pub update: Arc<dyn BeliefUpdate>,
+    /// How beliefs change; `None` where this program does not have what the episode was made with.
+    pub update: Option<Arc<dyn BeliefUpdate>>,
     /// The arm before the shelf.
     pub arm: Arc<ArmTool>,
     /// Views that its hand cannot be at.

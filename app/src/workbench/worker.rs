@@ -7,7 +7,7 @@ use super::half_belief::HalfBelief;
 use super::latest::words_of;
 use super::session::{Activity, Moment, SessionId, Setup};
 use super::threads::Threads;
-use crate::driver::Driver;
+use crate::driver::{Driver, update_of};
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepOutcome, review};
@@ -289,14 +289,14 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
     match begin {
         Begin::Start { scene, config, out } => {
             let update = update_named(&config.belief, &config)?;
-            let driver = Driver::start(*scene, catalog, *config, update, &out, Overwrite::Refuse)?;
+            let driver = Driver::start(*scene, catalog, *config, update.clone(), &out, Overwrite::Refuse)?;
             let moments = vec![Arc::new(moment(driver.episode(), None, None))];
-            let opened = opened(&out, driver.episode(), moments, None)?;
+            let opened = opened(&out, driver.episode(), Some(update), moments, None)?;
             Ok((Track::Writing(Box::new(driver)), opened))
         }
         Begin::Branch { of, steps, out } => {
             let update = update_named(&of.config.belief, &of.config)?;
-            let mut driver = Driver::start(of.scene, catalog, of.config, update, &out, Overwrite::Refuse)?;
+            let mut driver = Driver::start(of.scene, catalog, of.config, update.clone(), &out, Overwrite::Refuse)?;
             let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
             for (done, step) in of.steps.into_iter().take(steps).enumerate() {
                 progress(post, brake, done, steps)?;
@@ -304,40 +304,50 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
                 let next = moment(driver.episode(), Some(outcome), moments.last().map(|moment| &**moment));
                 moments.push(Arc::new(next));
             }
-            let opened = opened(&out, driver.episode(), moments, None)?;
+            let opened = opened(&out, driver.episode(), Some(update), moments, None)?;
             Ok((Track::Writing(Box::new(driver)), opened))
         }
         Begin::Open { path, look_only } => {
             let record = EpisodeDir::open(&path)?.record()?;
-            let update = update_named(&record.config.belief, &record.config)?;
             let of = record.steps.len();
-            let look = |why: String| {
+            let look = |update: Option<Arc<dyn BeliefUpdate>>, why: String| {
                 let mut moments = Vec::with_capacity(of + 1);
-                let (episode, difference) =
-                    review(&path, catalog.clone(), update.clone(), &mut watch(post, brake, of, &mut moments))?;
+                let mut watch = watch(post, brake, of, &mut moments);
+                let (episode, difference) = review(&path, catalog.clone(), update.clone(), &mut watch)?;
+                drop(watch);
                 let reason = difference.map_or(why, |difference| {
                     format!("its actions lead elsewhere when repeated here ({difference}); shown is what it holds")
                 });
-                Ok((Track::Reading, opened(&path, &episode, moments, Some(reason))?))
+                Ok((Track::Reading, opened(&path, &episode, update, moments, Some(reason))?))
+            };
+            let update = match update_of(&record.config.belief)? {
+                Ok(update) => update,
+                Err(why) => return look(None, format!("{why}; {HELD}")),
             };
             if look_only {
-                return look("nothing in its directory shall change".to_owned());
+                return look(Some(update), "nothing in its directory shall change".to_owned());
             }
             let mut moments = Vec::with_capacity(of + 1);
             let resumed =
                 Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, brake, of, &mut moments));
             match resumed {
                 Ok(driver) => {
-                    let opened = opened(&path, driver.episode(), moments, None)?;
+                    let opened = opened(&path, driver.episode(), Some(update), moments, None)?;
                     Ok((Track::Writing(Box::new(driver)), opened))
                 }
                 // What cannot be written, is being written by another run, or is of another version or machine.
-                Err(refused @ (Error::Io { .. } | Error::Input { .. } | Error::Check(_))) => look(refused.to_string()),
+                Err(refused @ (Error::Io { .. } | Error::Input { .. } | Error::Check(_))) => {
+                    look(Some(update), refused.to_string())
+                }
                 Err(error) => Err(error),
             }
         }
     }
 }
+
+/// What an episode lacks whose belief update is not here.
+const HELD: &str =
+    "shown is what it holds: pushes are not predicted, and after one every voxel counts as unseen in Gains";
 
 /// Keeps every state of an episode that is being repeated, and tells how far it is.
 fn watch<'a>(
@@ -362,7 +372,13 @@ fn progress(post: &Post, brake: &Brake, done: usize, of: usize) -> Result<()> {
     Ok(())
 }
 
-fn opened(path: &Path, episode: &Episode, moments: Vec<Arc<Moment>>, read_only: Option<String>) -> Result<Opened> {
+fn opened(
+    path: &Path,
+    episode: &Episode,
+    update: Option<Arc<dyn BeliefUpdate>>,
+    moments: Vec<Arc<Moment>>,
+    read_only: Option<String>,
+) -> Result<Opened> {
     let record = episode.record().clone();
     let views = ViewArray::named(&record.config.views)?;
     let hidden = hidden_objects(&record.scene.shelf, &moments[0].bodies, &views);
@@ -373,7 +389,7 @@ fn opened(path: &Path, episode: &Episode, moments: Vec<Arc<Moment>>, read_only: 
     let setup = Setup {
         catalog: Arc::new(episode.catalog().clone()),
         views: Arc::new(views),
-        update: update_named(&record.config.belief, &record.config)?,
+        update,
         arm: episode.arm().clone(),
         unreachable: Arc::new(episode.unreachable_views().to_vec()),
         hidden: Arc::new(hidden.iter().map(name).collect()),

@@ -164,7 +164,7 @@ fn who_only_looks_is_shown_what_is_filed_and_told_where_it_parts_from_what_is() 
     let path = root.path().join("episode");
     let first = run(&path, BUDGET);
     let reviewed = |watch: &mut dyn FnMut(&Episode, Option<&StepRecord>)| {
-        review(&path, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |episode, outcome| {
+        review(&path, Arc::new(Catalog::standard()), Some(Arc::new(Classical)), &mut |episode, outcome| {
             watch(episode, outcome.map(|outcome| &outcome.record));
             Ok(())
         })
@@ -196,6 +196,19 @@ fn who_only_looks_is_shown_what_is_filed_and_told_where_it_parts_from_what_is() 
     assert_eq!([shown[0].2, shown[4].2, shown[5].2], [occupied, occupied, occupied ^ 1]);
     assert_eq!((shown.len(), whole.record()), (BUDGET + 1, &record));
     assert_eq!(names_of(&path), ["beliefs", "episode.json", "truth"]);
+
+    // Without the update that it was made with.
+    record.config.belief = "another".to_owned();
+    fs::write(path.join("episode.json"), record.to_json()).expect("written");
+    let mut at = 0;
+    let (whole, difference) = review(&path, Arc::new(Catalog::standard()), None, &mut |episode, outcome| {
+        assert!(*episode.belief() == directory.read_belief(at)?, "step {at}");
+        assert!(outcome.is_none_or(|outcome| outcome.prediction.is_none() && outcome.record == record.steps[at - 1]));
+        at += 1;
+        Ok(())
+    })
+    .expect("reviewed");
+    assert_eq!((difference, at, whole.record()), (None, BUDGET + 1, &record));
 }
 
 /// What is in a folder, by name.

@@ -4,7 +4,8 @@ use super::directory::EpisodeDir;
 use super::machine::Episode;
 use super::record::StepOutcome;
 use super::replay::{Comparison, Difference};
-use crate::belief::BeliefUpdate;
+use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
+use crate::camera::MapObservation;
 use crate::scene::Catalog;
 use crate::{Error, Result};
 use std::path::Path;
@@ -34,17 +35,42 @@ pub fn resume(
 /// Opens the episode in `path` to look at it: nothing is locked or written. Where the repeated actions do not lead where
 /// the log says (it was written by another version, or on another machine), the filed step, belief and truth stand in
 /// place of the repeated ones, and the first such place is told beside the episode. Bodies and images remain the
-/// repeated ones.
+/// repeated ones. Without an update everything is as it is filed, nothing is compared, pushes have no predictions, and
+/// after a push no voxel counts as seen.
 ///
 /// # Errors
 /// Those of [`resume`] but for [`Error::Check`], and [`Error::Usage`] for an action of the log that cannot be repeated.
 pub fn review(
     path: impl AsRef<Path>,
     catalog: Arc<Catalog>,
-    update: Arc<dyn BeliefUpdate>,
+    update: Option<Arc<dyn BeliefUpdate>>,
     observer: Observer<'_>,
 ) -> Result<(Episode, Option<Difference>)> {
-    retrace(&EpisodeDir::open(path.as_ref())?, catalog, update, Departure::Overruled, observer)
+    let directory = EpisodeDir::open(path.as_ref())?;
+    match update {
+        Some(update) => retrace(&directory, catalog, update, Departure::Overruled, observer),
+        None => {
+            let update = Arc::new(Absent(directory.record()?.config.belief));
+            retrace(&directory, catalog, update, Departure::Expected, observer)
+        }
+    }
+}
+
+/// Stands for the update that a log names where there is none: leaves every belief as it is.
+struct Absent(String);
+
+impl BeliefUpdate for Absent {
+    fn name(&self) -> &str {
+        &self.0
+    }
+
+    fn observe(&self, belief: &Belief, _observation: &MapObservation) -> Belief {
+        belief.clone()
+    }
+
+    fn predict_pushes(&self, _belief: &Belief, _pushes: &[SweptPush]) -> Vec<PushPrediction> {
+        Vec::new()
+    }
 }
 
 /// What to do where repeated actions do not lead where the log says.
@@ -52,8 +78,10 @@ pub fn review(
 enum Departure {
     /// End with an error.
     Refused,
-    /// Go on from what is filed.
+    /// Go on from what is filed, and tell where it began.
     Overruled,
+    /// Go on from what is filed after every action, comparing nothing.
+    Expected,
 }
 
 fn retrace(
@@ -76,18 +104,21 @@ fn retrace(
         } else {
             comparison.prior(&logged, episode.record());
         }
-        comparison.arrays(directory, &logged, done, &episode)?;
-        if let Some(difference) = comparison.into_first_difference() {
-            if departure == Departure::Refused {
-                let place = directory.path().display();
-                return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
-            }
+        if departure != Departure::Expected {
+            comparison.arrays(directory, &logged, done, &episode)?;
+        }
+        let difference = comparison.into_first_difference();
+        if let (Departure::Refused, Some(difference)) = (departure, &difference) {
+            let place = directory.path().display();
+            return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
+        }
+        if departure == Departure::Expected || difference.is_some() {
             episode.adopt_state(&logged, directory.read_belief(done)?, directory.read_truth(done)?);
             if let Some(outcome) = &mut outcome {
                 outcome.record = logged.steps[done - 1].clone();
             }
-            first.get_or_insert(difference);
         }
+        first = first.or(difference.filter(|_| departure == Departure::Overruled));
         observer(&episode, outcome.as_ref())?;
     }
     episode.adopt_log(logged);

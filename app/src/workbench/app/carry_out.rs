@@ -364,11 +364,12 @@ impl App {
         let Some(session) = self.model.session() else { return };
         let moment = session.moment(self.model.cursor).clone();
         let (of, setup) = ((session.id, moment.step), session.setup.clone());
+        let Some(update) = setup.update.clone() else { return };
         self.background.preview.ask(move |_| {
             let belief = moment.belief.belief();
             let swept = swept_by(&setup.arm, &belief, &push);
             let swept = SweptPush { push, swept };
-            let prediction = setup.update.predict_pushes(&belief, std::slice::from_ref(&swept)).pop()?;
+            let prediction = update.predict_pushes(&belief, std::slice::from_ref(&swept)).pop()?;
             Some(Preview { of, push, prediction: Arc::new(prediction), swept: Arc::new(swept.swept) })
         });
     }

@@ -126,3 +126,25 @@ fn panels_stay_as_wide_as_they_were_made() {
         }
     }
 }
+
+#[test]
+fn an_episode_of_the_networks_opens_in_a_build_without_them() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 1);
+    harness.state_mut().ask(Command::Run);
+    wait(&mut harness);
+    let (id, path) = harness.state().model.session().map(|session| (session.id, session.path.clone())).expect("open");
+    harness.state_mut().ask(Command::Close(id));
+    harness.run_steps(3);
+    let document = path.join("episode.json");
+    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["belief"] = "cnabu".into();
+    std::fs::write(&document, record.to_string()).expect("as if the networks had made it");
+    harness.state_mut().ask(Command::Open(path));
+    harness.run_steps(3);
+    wait(&mut harness);
+    let session = harness.state().model.session().expect("shown all the same");
+    let reason = session.read_only.as_deref().expect("to look at only");
+    assert!(reason.contains("shown is what it holds"), "{reason}");
+    assert_eq!((session.steps(), session.setup.update.is_some()), (1, nudge_core::cnabu::AVAILABLE));
+}

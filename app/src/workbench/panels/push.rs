@@ -252,6 +252,9 @@ impl Here<'_> {
         let asked = |preview: &&Preview| preview.of == (self.session.id, self.step) && preview.push == candidate.push;
         match self.model.preview.as_ref().filter(asked) {
             Some(preview) => self.prediction(state, ui, preview, ask),
+            None if self.session.setup.update.is_none() => {
+                ui.weak("What it would do cannot be predicted: the networks are not here");
+            }
             None => {
                 ui.weak("Click the push to predict what it would do");
             }

@@ -8,12 +8,17 @@ use std::time::{Duration, Instant};
 
 const SCENE: &str = "scenes/high/box-wall.toml";
 
-fn run(out: &Path, more: &[&str]) -> Value {
+/// What is typed to run the episode of these tests.
+fn words<'a>(out: &'a Path, more: &[&'a str]) -> Vec<&'a str> {
     let out = out.to_str().expect("utf-8");
-    let mut args =
+    let mut words =
         vec!["run", SCENE, "--policy", "mem", "--belief", "classical", "--seed", "1", "--out", out, "--json"];
-    args.extend(more);
-    serde_json::from_str(&nudge_ok(&args)).expect("JSON on stdout")
+    words.extend(more);
+    words
+}
+
+fn run(out: &Path, more: &[&str]) -> Value {
+    serde_json::from_str(&nudge_ok(&words(out, more))).expect("JSON on stdout")
 }
 
 /// The record without what the clock says.
@@ -122,24 +127,7 @@ fn an_episode_that_cannot_be_resumed_stays_as_it_is() {
             .collect()
     };
     let before = files();
-    let line = nudge_fails(
-        1,
-        &[
-            "run",
-            SCENE,
-            "--policy",
-            "mem",
-            "--belief",
-            "classical",
-            "--seed",
-            "1",
-            "--resume",
-            "--budget",
-            "3",
-            "--out",
-            out.to_str().expect("utf-8"),
-        ],
-    );
+    let line = nudge_fails(1, &words(&out, &["--budget", "3", "--resume"]));
     assert!(line.contains("cannot be resumed: step 2: displacement_m: 0.5 in the log, 0.0 now"), "{line}");
     assert!(files() == before, "recording, figure and log are those of before, and nothing is left over");
 }

@@ -3,7 +3,7 @@ use super::super::synthetic;
 use super::super::{Overwrite, Precision};
 use super::super::{resume, review};
 use super::*;
-use crate::belief::Classical;
+use crate::belief::{Belief, Classical};
 use crate::plan::{Action, PolicyKind};
 use std::fs;
 use std::path::Path;
@@ -108,13 +108,7 @@ fn an_episode_resumes_and_replays_to_the_bit() {
         record.steps[3].scores.semantic_miou += 1e-12;
         record.steps[5].objects[0].class = "gum_tin".to_owned();
     });
-    let directory = EpisodeDir::open(&path).expect("opens");
-    let mut belief = directory.read_belief(3).expect("a belief");
-    belief.semantics[17][2] += 0.5;
-    fs::write(directory.belief_path(3), npz::belief_archive(&belief, Precision::Half)).expect("written");
-    let mut truth = first.truth().clone();
-    truth.occupancy[1234] ^= 1;
-    fs::write(directory.truth_path(5), npz::truth_archive(&truth)).expect("written");
+    change_arrays(&path, &first);
     let report = replayed(&path).expect("replays");
     assert_eq!(report.agreement, Agreement::Differs);
     let places: Vec<(usize, &str)> = report.differences.iter().map(|d| (d.step, d.place.as_str())).collect();
@@ -178,12 +172,7 @@ fn who_only_looks_is_shown_what_is_filed_and_told_where_it_parts_from_what_is() 
     let mut record = directory.record().expect("a record");
     record.steps[2].scores.semantic_miou = 0.125;
     fs::write(path.join("episode.json"), record.to_json()).expect("written");
-    let mut belief = directory.read_belief(3).expect("a belief");
-    belief.semantics[17][2] += 0.5;
-    fs::write(directory.belief_path(3), npz::belief_archive(&belief, Precision::Half)).expect("written");
-    let mut truth = first.truth().clone();
-    truth.occupancy[1234] ^= 1;
-    fs::write(directory.truth_path(5), npz::truth_archive(&truth)).expect("written");
+    let belief = change_arrays(&path, &first);
     let mut shown = Vec::new();
     let (whole, difference) = reviewed(&mut |episode, step| {
         let score = step.map_or(episode.record().prior, |step| step.scores).semantic_miou;
@@ -209,6 +198,18 @@ fn who_only_looks_is_shown_what_is_filed_and_told_where_it_parts_from_what_is() 
     })
     .expect("reviewed");
     assert_eq!((difference, at, whole.record()), (None, BUDGET + 1, &record));
+}
+
+/// Changes a number of the belief after three actions and one of the truth after five; returns that belief.
+fn change_arrays(path: &Path, first: &Episode) -> Belief {
+    let directory = EpisodeDir::open(path).expect("opens");
+    let mut belief = directory.read_belief(3).expect("a belief");
+    belief.semantics[17][2] += 0.5;
+    fs::write(directory.belief_path(3), npz::belief_archive(&belief, Precision::Half)).expect("written");
+    let mut truth = first.truth().clone();
+    truth.occupancy[1234] ^= 1;
+    fs::write(directory.truth_path(5), npz::truth_archive(&truth)).expect("written");
+    belief
 }
 
 /// What is in a folder, by name.

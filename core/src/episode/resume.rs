@@ -2,7 +2,7 @@
 
 use super::directory::EpisodeDir;
 use super::machine::Episode;
-use super::record::StepOutcome;
+use super::record::{EpisodeRecord, StepOutcome};
 use super::replay::{Comparison, Difference};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::MapObservation;
@@ -95,32 +95,41 @@ fn retrace(
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
     let mut first = None;
     for done in 0..=logged.steps.len() {
-        let mut comparison = Comparison::new(0.0);
-        let mut outcome = None;
-        if let Some(step) = done.checked_sub(1).map(|at| &logged.steps[at]) {
-            let repeated = episode.act(step.decision.clone())?;
-            comparison.step(step, &repeated.record);
-            outcome = Some(repeated);
-        } else {
-            comparison.prior(&logged, episode.record());
-        }
-        if departure != Departure::Expected {
-            comparison.arrays(directory, &logged, done, &episode)?;
-        }
-        let difference = comparison.into_first_difference();
+        let step = done.checked_sub(1).map(|at| &logged.steps[at]);
+        let mut outcome = step.map(|step| episode.act(step.decision.clone())).transpose()?;
+        let difference = match departure {
+            Departure::Expected => None,
+            Departure::Refused | Departure::Overruled => difference(directory, &logged, done, &episode)?,
+        };
         if let (Departure::Refused, Some(difference)) = (departure, &difference) {
             let place = directory.path().display();
             return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
         }
         if departure == Departure::Expected || difference.is_some() {
             episode.adopt_state(&logged, directory.read_belief(done)?, directory.read_truth(done)?);
-            if let Some(outcome) = &mut outcome {
-                outcome.record = logged.steps[done - 1].clone();
+            if let (Some(outcome), Some(step)) = (&mut outcome, step) {
+                outcome.record = step.clone();
             }
         }
-        first = first.or(difference.filter(|_| departure == Departure::Overruled));
+        first = first.or(difference);
         observer(&episode, outcome.as_ref())?;
     }
     episode.adopt_log(logged);
     Ok((episode, first))
+}
+
+/// The first place where the episode after `done` actions is not what is filed.
+fn difference(
+    directory: &EpisodeDir,
+    logged: &EpisodeRecord,
+    done: usize,
+    episode: &Episode,
+) -> Result<Option<Difference>> {
+    let mut comparison = Comparison::new(0.0);
+    match done.checked_sub(1) {
+        Some(at) => comparison.step(&logged.steps[at], &episode.record().steps[at]),
+        None => comparison.prior(logged, episode.record()),
+    }
+    comparison.arrays(directory, logged, done, episode)?;
+    Ok(comparison.into_first_difference())
 }

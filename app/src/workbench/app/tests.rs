@@ -8,7 +8,7 @@ use crate::workbench::session::Activity;
 use crate::workbench::worker::Order;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// A window whose episodes go to `folder`, with the first-look scene of the demonstration opened for `budget` actions.
@@ -22,6 +22,23 @@ fn window(folder: &Path, budget: usize) -> Harness<'static, App> {
     harness.state_mut().ask(Command::Open(scene));
     wait(&mut harness);
     harness
+}
+
+/// Runs the episode to its end, closes it, changes its log, and opens it again; returns its directory.
+fn reopened(harness: &mut Harness<'_, App>, change: impl FnOnce(&mut serde_json::Value)) -> PathBuf {
+    harness.state_mut().ask(Command::Run);
+    wait(harness);
+    let (id, path) = harness.state().model.session().map(|session| (session.id, session.path.clone())).expect("open");
+    harness.state_mut().ask(Command::Close(id));
+    harness.run_steps(3);
+    let document = path.join("episode.json");
+    let mut record = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    change(&mut record);
+    std::fs::write(&document, record.to_string()).expect("written");
+    harness.state_mut().ask(Command::Open(path.clone()));
+    harness.run_steps(3);
+    wait(harness);
+    path
 }
 
 fn wait(harness: &mut Harness<'_, App>) {
@@ -84,19 +101,8 @@ fn a_worker_that_panics_leaves_the_window_and_a_way_to_go_on() {
 fn an_episode_of_another_version_is_shown_as_it_is_filed() {
     let folder = tempfile::tempdir().expect("folder");
     let mut harness = window(folder.path(), 2);
-    harness.state_mut().ask(Command::Run);
-    wait(&mut harness);
-    let (id, path) = harness.state().model.session().map(|session| (session.id, session.path.clone())).expect("open");
-    harness.state_mut().ask(Command::Close(id));
-    harness.run_steps(3);
-
-    let document = path.join("episode.json");
-    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
-    record["steps"][0]["scores"]["semantic_miou"] = 0.125.into();
-    std::fs::write(&document, record.to_string()).expect("as if another version had written it");
-    harness.state_mut().ask(Command::Open(path.clone()));
-    harness.run_steps(3);
-    wait(&mut harness);
+    // As if another version had written it.
+    let path = reopened(&mut harness, |record| record["steps"][0]["scores"]["semantic_miou"] = 0.125.into());
     let session = harness.state().model.session().expect("shown all the same");
     let reason = session.read_only.as_deref().expect("to look at only");
     assert!(reason.contains("step 1: scores.semantic_miou: 0.125 in the log"), "{reason}");
@@ -131,18 +137,7 @@ fn panels_stay_as_wide_as_they_were_made() {
 fn an_episode_of_the_networks_opens_in_a_build_without_them() {
     let folder = tempfile::tempdir().expect("folder");
     let mut harness = window(folder.path(), 1);
-    harness.state_mut().ask(Command::Run);
-    wait(&mut harness);
-    let (id, path) = harness.state().model.session().map(|session| (session.id, session.path.clone())).expect("open");
-    harness.state_mut().ask(Command::Close(id));
-    harness.run_steps(3);
-    let document = path.join("episode.json");
-    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
-    record["belief"] = "cnabu".into();
-    std::fs::write(&document, record.to_string()).expect("as if the networks had made it");
-    harness.state_mut().ask(Command::Open(path));
-    harness.run_steps(3);
-    wait(&mut harness);
+    reopened(&mut harness, |record| record["belief"] = "cnabu".into());
     let session = harness.state().model.session().expect("shown all the same");
     let reason = session.read_only.as_deref().expect("to look at only");
     assert!(reason.contains("shown is what it holds"), "{reason}");

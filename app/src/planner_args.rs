@@ -23,7 +23,7 @@ pub struct PlannerArgs {
     /// What a push has to promise at least, 0 to 100000 nats (default: 2000 where only unseen voxels count, else 0)
     #[arg(long, value_name = "NATS", value_parser = push_floor)]
     push_floor: Option<f32>,
-    /// The last steps, in which nothing is pushed (default: 4 where only unseen voxels count, else 1)
+    /// Looks that follow a push before the next one, and at the end (default: 4 where only unseen voxels count, else 1)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
     closing_steps: Option<u16>,
 }

@@ -28,9 +28,9 @@ use nudge_core::arm::{ArmTool, Joints};
 use nudge_core::belief::{Belief, PushPrediction};
 use nudge_core::camera::{Image, View, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
-use nudge_core::gain::{GainField, RayDensity, gain_per_voxel};
+use nudge_core::gain::{GainField, RayDensity};
 use nudge_core::grid::{Grid, VoxelSet};
-use nudge_core::plan::{Action, PlannerSettings, gain_field};
+use nudge_core::plan::{Action, PlannerSettings, gain_field, gain_sources};
 use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
@@ -193,11 +193,11 @@ impl Recorder {
         let Some(field) = &self.field else { return Vec::new() };
         let decision = &outcome.record.decision;
         match (decision.action, &outcome.prediction) {
-            (Action::Look { view }, _) => gain_per_voxel(field, setting.views, view, RayDensity::COARSE),
+            (Action::Look { view }, _) => gain_sources(field, setting.views, view, RayDensity::COARSE),
             (Action::Push(_), Some(prediction)) => {
                 let best = decision.best_push.and_then(|at| decision.candidates.get(at)?.view);
                 best.map_or_else(Vec::new, |view| {
-                    gain_per_voxel(&field.with_prediction(prediction), setting.views, view, RayDensity::COARSE)
+                    gain_sources(&field.with_prediction(prediction), setting.views, view, RayDensity::COARSE)
                 })
             }
             (Action::Push(_), None) => Vec::new(),

@@ -6,8 +6,10 @@
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
 use nudge_core::belief::{Belief, PushPrediction, bernoulli_entropy};
 use nudge_core::camera::{Intrinsics, View, ViewArray, ViewId};
-use nudge_core::gain::{GainField, Openings, RayDensity, RayGains, best_pair, gain_of_views};
-use nudge_core::grid::{Grid, Window};
+use nudge_core::gain::{
+    Coverage, GainField, Openings, RayDensity, RayGains, best_pair, gain_of_views, informed_voxels,
+};
+use nudge_core::grid::{Grid, VoxelSet, Window};
 use nudge_core::rng::stream;
 use nudge_core::{Point, Pose, Vector};
 use rand::Rng;
@@ -53,6 +55,15 @@ fn report(name: &str, belief: &Belief, array: &ViewArray) {
     let pair = best_of(3, || _ = black_box(best_pair(&field, array, &gains, density)));
     print_row("best pair, given the gains", pair, None, "");
 
+    let seen = field.with_seen(&seen_by(&field, array, &all));
+    let rays = best_of(3, || _ = black_box(gain_of_views(&seen, array, &all, density)));
+    let coverage = best_of(3, || {
+        let coverage = Coverage::new(&seen, array, &all, density);
+        black_box((coverage.gains(), coverage.best_pair(|_| true)));
+    });
+    print_row("all 300 views after three looks, by rays", rays, Some(0.30), "");
+    print_row("  by coverage, with the best pair", coverage, Some(0.30), "");
+
     let coarse: Vec<ViewId> = all.iter().copied().step_by(5).collect();
     let pushes: Vec<PushPrediction> = (0..80).map(|index| prediction(belief, index)).collect();
     let base = best_of(3, || drop(black_box(RayGains::new(&field, array, &coarse, RayDensity::COARSE))));
@@ -75,6 +86,15 @@ fn report(name: &str, belief: &Belief, array: &ViewArray) {
     });
     print_row("what 60 coarse views reach together", base, None, "");
     print_row("80 predicted pushes: what they open", opened, None, "");
+}
+
+/// What three of the views show.
+fn seen_by(field: &GainField, array: &ViewArray, all: &[ViewId]) -> VoxelSet {
+    let mut seen = VoxelSet::empty(field.grid());
+    for &view in all.iter().skip(30).step_by(100) {
+        seen.union_with(&informed_voxels(field, array, view, RayDensity::gapless(field.grid(), array)));
+    }
+    seen
 }
 
 fn print_row(what: &str, seconds: f64, target: Option<f64>, note: &str) {

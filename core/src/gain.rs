@@ -30,6 +30,7 @@
 //! leaves out at most `T max(H(p) / p) = 4 T`, 4e-4 nats of a ray. A ray's own rounding is 2^-25 nats.
 
 mod code;
+mod cover;
 mod field;
 mod open;
 mod pair;
@@ -39,6 +40,7 @@ mod skip;
 #[cfg(test)]
 mod tests;
 
+pub use cover::{CELL_M, Coverage};
 pub use field::GainField;
 pub use open::{Openings, gain_together};
 pub use pair::{ViewPair, best_pair};

@@ -4,22 +4,23 @@
 //! semantic map and `gamma = 1/5`. A [`Decision`] keeps everything that was weighed.
 
 mod decide;
+mod look;
 mod policy;
 mod rule;
 mod weigh;
 
 pub use decide::decide;
+pub use look::{gain_field, gain_sources};
 pub use policy::PolicyKind;
 pub use rule::{
     CLOSING_STEPS, PATIENCE, PUSH_EVERY, PUSH_FLOOR, QUIET_STEPS, RESTORING_STEPS, SATURATION, look_or_push,
-    push_guard, saturated,
+    push_guard, saturated, still_closing,
 };
 pub use weigh::{COARSE_VIEWS, disturbance};
 
 use crate::arm::{ArmTool, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CERTAIN, CNABU, COMPLETE_SHARE};
 use crate::camera::{ViewArray, ViewId};
-use crate::gain::GainField;
 use crate::grid::VoxelSet;
 use crate::named;
 use crate::push::{PushSampler, Rejection};
@@ -57,7 +58,7 @@ pub enum Reason {
     TooEarly,
     /// No push in the last step, or the last steps.
     LastStep,
-    /// No push right after a push.
+    /// No push right after a push, nor (policy `mem`) before it is closed by looks.
     JustPushed,
     /// The map is complete: only looks.
     MapComplete,
@@ -174,6 +175,11 @@ impl History {
         }
     }
 
+    /// Looks since the last push; `None` before the first one.
+    pub fn looks_since_push(&self) -> Option<usize> {
+        self.actions.iter().rev().position(|action| matches!(action, Action::Push(_)))
+    }
+
     /// Whether the last action was a push.
     pub fn just_pushed(&self) -> bool {
         matches!(self.actions.last(), Some(Action::Push(_)))
@@ -219,8 +225,8 @@ pub enum Counted {
     #[default]
     All,
     /// Those that no look has seen yet, or not since a push may have changed them. What a push would make uncertain of
-    /// what was seen is no gain; it is worth what it opens to all views together ([`crate::gain::Openings`]). IGV and IGM
-    /// count each voxel once.
+    /// what was seen is no gain; it is worth what it opens to all views together ([`crate::gain::Openings`]). Each voxel
+    /// counts once: in the gain of a view ([`crate::gain::Coverage`]), in IGV and in IGM.
     Unseen,
 }
 
@@ -268,12 +274,6 @@ impl std::str::FromStr for Counted {
     }
 }
 
-/// What rays walk through to tell what views gain under a belief: voxels of `seen` block but do not count.
-pub fn gain_field(belief: &Belief, seen: Option<&VoxelSet>) -> GainField {
-    let field = GainField::new(belief);
-    seen.map(|seen| field.with_seen(seen)).unwrap_or(field)
-}
-
 /// Numbers of the planner that a user may change.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -297,7 +297,8 @@ pub struct PlannerSettings {
     pub complete: f32,
     /// The first steps, in which nothing is pushed.
     pub quiet_steps: usize,
-    /// The last steps, in which nothing is pushed: looks that make good what a push disturbs.
+    /// Looks that close a push, making good what it disturbs and seeing what it opens: none is made in the last so many
+    /// steps, and `mem` makes none before so many looks followed the one before.
     pub closing_steps: usize,
     /// The policy `saturation` pushes once two consecutive best gains differ by less than this share.
     pub saturation: f32,
@@ -323,8 +324,8 @@ impl Default for PlannerSettings {
 
 impl PlannerSettings {
     /// These settings with what goes with a way to count: the paper's rule where all voxels count. Where only unseen ones
-    /// do, a push has to promise [`PATIENCE`] times what looking does, and at least [`PUSH_FLOOR`]; and the last
-    /// [`RESTORING_STEPS`] steps look: a push takes about that many looks to pay off.
+    /// do, a push has to promise [`PATIENCE`] times what looking does, and at least [`PUSH_FLOOR`]; and
+    /// [`RESTORING_STEPS`] looks close it: a push takes about that many to pay off.
     pub fn counting(self, counted: Counted) -> Self {
         let (patience, push_floor, closing_steps) = match counted {
             Counted::All => (1.0, 0.0, CLOSING_STEPS),

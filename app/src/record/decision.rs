@@ -83,7 +83,7 @@ pub(crate) fn reason(reason: Reason) -> &'static str {
         Reason::ViewOfPush => "the view that made the push worth it",
         Reason::TooEarly => "no push in the first steps",
         Reason::LastStep => "no push in the last steps",
-        Reason::JustPushed => "no push right after a push",
+        Reason::JustPushed => "no push soon after a push",
         Reason::MapComplete => "the map is complete",
         Reason::Dropped => "an object was dropped, so no more pushes",
         Reason::NoCandidate => "no feasible push",

@@ -7,8 +7,8 @@ use super::session::{Activity, Moment, Session, SessionId, Setup};
 use nudge_core::belief::{BeliefUpdate, Classical, SweptPush};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
-use nudge_core::gain::{RayDensity, gain_per_voxel};
-use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, gain_field};
+use nudge_core::gain::RayDensity;
+use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, gain_field, gain_sources};
 use nudge_core::push::swept_by;
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
 use nudge_core::world::TruthMap;
@@ -171,7 +171,7 @@ pub fn answer(model: &mut Model) {
         Preview { of: (session.id, step), push, prediction: Arc::new(prediction), swept: Arc::new(swept) }
     });
     let source = model.view.map(|view| {
-        let nats = gain_per_voxel(
+        let nats = gain_sources(
             &gain_field(&belief, session.moment(step).seen.as_deref()),
             &session.setup.views,
             view,

@@ -1,6 +1,6 @@
 //! A belief's occupancy prepared for walking rays.
 
-use super::code::{OPAQUE, Quantiser};
+use super::code::{MATTER, OPAQUE, Quantiser};
 use super::{RayDensity, arrivals, skip};
 use crate::belief::{Belief, PushPrediction, beta_mean};
 use crate::camera::{ViewArray, ViewId};
@@ -86,6 +86,11 @@ impl GainField {
         Self { layout: self.layout, codes: self.codes.clone(), seen: Some(Arc::new(arrival)) }
     }
 
+    /// Whether it tells seen voxels from others, as [`GainField::with_seen`] makes it.
+    pub fn knows_seen(&self) -> bool {
+        self.seen.is_some()
+    }
+
     /// What of a ray's transmittance at a voxel tells something that no earlier view saw.
     #[inline(always)]
     pub(super) fn unseen_share(&self, index: usize, transmittance: f32) -> f32 {
@@ -93,6 +98,11 @@ impl GainField {
             None => transmittance,
             Some(seen) => (transmittance - seen[index]).max(0.0),
         }
+    }
+
+    /// Entropy of a voxel of the padded grid, as far as no earlier view saw it, nats.
+    pub(super) fn unseen_information(&self, index: usize) -> f32 {
+        self.unseen_share(index, 1.0) * MATTER[usize::from(self.codes[index])].information
     }
 
     /// This field without skip levels: rays walk it voxel by voxel, and a window of it can be written over as it is.

@@ -1,10 +1,10 @@
 //! From a situation to the next action.
 
-use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated};
+use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 use super::weigh::{Weighed, random_push, weigh_pushes};
-use super::{Action, Counted, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field};
+use super::{Action, Counted, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field, look};
 use crate::camera::ViewId;
-use crate::gain::{RayDensity, best_pair, gain_of_views, gain_together};
+use crate::gain::{RayDensity, gain_together};
 use crate::rng::stream;
 use rand::Rng;
 use rayon::prelude::*;
@@ -18,12 +18,8 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
     let step = history.actions.len();
     let field = gain_field(situation.belief, situation.seen);
     let ids: Vec<ViewId> = views.views.iter().map(|view| view.id).collect();
-    let gains = gain_of_views(&field, views, &ids, RayDensity::FULL);
-    let mut fresh = gains.clone();
-    for view in history.used_views.iter().chain(situation.unreachable) {
-        fresh[usize::from(view.0)] = 0.0;
-    }
-    let pair = best_pair(&field, views, &fresh, RayDensity::FULL);
+    let offered = |view: &ViewId| !history.used_views.contains(view) && !situation.unreachable.contains(view);
+    let (gains, pair) = look::gains_and_pair(&field, views, &ids, offered);
     let best_look = pair.map_or_else(|| fallback_view(situation), |pair| pair.first);
     let mut decision = Decision {
         action: Action::Look { view: best_look },
@@ -50,6 +46,8 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
                 decision.reason = Reason::ViewOfPush;
             } else if let Some(reason) = guard() {
                 decision.reason = reason;
+            } else if still_closing(history, settings) {
+                decision.reason = Reason::JustPushed;
             } else {
                 let weighed = weigh_pushes(settings, situation, &field);
                 choose(&mut decision, weighed, settings);

@@ -4,9 +4,9 @@ use super::{History, PlannerSettings, Reason};
 
 /// The first steps, in which nothing is pushed: the map is still too empty to push by.
 pub const QUIET_STEPS: usize = 3;
-/// The last steps, in which nothing is pushed, when all voxels count: after the last one nothing would be looked at.
+/// Looks that close a push, when all voxels count: after the last push something has to be looked at.
 pub const CLOSING_STEPS: usize = 1;
-/// The last steps, in which nothing is pushed, when unseen voxels count.
+/// Looks that close a push, when unseen voxels count.
 pub const RESTORING_STEPS: usize = 4;
 /// How many times what looking promises a push has to promise when unseen voxels count.
 pub const PATIENCE: f32 = 10.0;
@@ -41,6 +41,12 @@ pub fn push_guard(history: &History, budget: usize, map_complete: bool, settings
         (step + settings.closing_steps >= budget, Reason::LastStep),
     ];
     guards.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
+}
+
+/// Whether the last push is not closed yet: fewer than [`PlannerSettings::closing_steps`] looks followed it, so that what it
+/// disturbed is not made good and what it opened not seen.
+pub fn still_closing(history: &History, settings: &PlannerSettings) -> bool {
+    history.looks_since_push().is_some_and(|looks| looks < settings.closing_steps)
 }
 
 /// Whether looking no longer gets better or worse: two consecutive best gains differ by less than `share` of the larger
@@ -97,6 +103,7 @@ mod tests {
         let unseen = settings.counting(Counted::Unseen);
         assert_eq!(guard(&[LOOK; 15], &unseen), None);
         assert_eq!(guard(&[LOOK; 16], &unseen), Some(Reason::LastStep), "looks that make good what a push disturbs");
+        assert_eq!(guard(&[LOOK, PUSH, LOOK, LOOK], &unseen), None, "whoever has no rule but a schedule keeps to it");
         let quiet = PlannerSettings { quiet_steps: 4, ..settings };
         assert_eq!(guard(&[LOOK; 3], &quiet), Some(Reason::TooEarly), "a longer quiet time");
     }
@@ -106,6 +113,20 @@ mod tests {
         let settings = PlannerSettings::default();
         assert_eq!(guard(&[LOOK, LOOK, LOOK, PUSH], &settings), Some(Reason::JustPushed));
         assert_eq!(guard(&[LOOK, LOOK, LOOK, PUSH, LOOK], &settings), None);
+    }
+
+    #[test]
+    fn a_push_is_closed_by_so_many_looks() {
+        let settings = PlannerSettings::default();
+        let unseen = settings.counting(Counted::Unseen);
+        let closing = |looks: usize, settings| {
+            let actions: Vec<Action> = [LOOK, PUSH].into_iter().chain(vec![LOOK; looks]).collect();
+            still_closing(&after(&actions), settings)
+        };
+        assert!(closing(0, &settings) && !closing(1, &settings));
+        assert!(closing(3, &unseen) && !closing(4, &unseen));
+        assert!(!still_closing(&after(&[LOOK; 3]), &unseen), "no push, nothing to close");
+        assert!(still_closing(&after(&[PUSH, LOOK, LOOK, LOOK, LOOK, PUSH]), &unseen), "the last push counts");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::*;
 use crate::belief::{Classical, PushPrediction, SweptPush, evidence};
 use crate::camera::{Intrinsics, MapObservation, View};
-use crate::gain::{GainField, Openings, RayDensity, gain_of_views, gain_together};
+use crate::gain::{Coverage, GainField, Openings, RayDensity, gain_of_views, gain_together};
 use crate::grid::{Grid, VoxelSet, Window};
 use crate::scene::{CLASS_COUNT, Shelf};
 use crate::{Point, Pose, Vector};
@@ -259,6 +259,45 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
     table.history.record(&next, false);
     assert_eq!(table.history.view_of_push, None);
     assert_ne!(table.decide(PolicyKind::Mem).reason, Reason::ViewOfPush);
+}
+
+#[test]
+fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
+    let mut table = Table::new();
+    table.belief = Belief::uniform(table.belief.grid);
+    let best_height = |table: &Table| {
+        let Action::Look { view } = table.decide(PolicyKind::MemNoPush).action else { panic!("a look") };
+        table.views.view(view).expect("a view").position().z
+    };
+    let heights: Vec<f32> = table.views.views.iter().map(|view| view.position().z).collect();
+    let highest = heights.iter().copied().fold(0.0, f32::max);
+    assert!(heights.iter().any(|height| *height < highest - 0.05), "views of several heights");
+    table.settings = table.settings.counting(Counted::Unseen);
+    table.seen = Some(VoxelSet::empty(&table.belief.grid));
+    assert!((best_height(&table) - highest).abs() < 1e-6);
+}
+
+#[test]
+fn where_only_unseen_voxels_count_each_counts_once() {
+    let mut table = Table::after_looks(1);
+    table.settings = table.settings.counting(Counted::Unseen);
+    let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
+    let field = GainField::new(&table.belief);
+    let mut seen = VoxelSet::empty(&table.belief.grid);
+    (0..table.belief.grid.voxel_count()).step_by(2).for_each(|voxel| seen.insert(voxel));
+    let field = field.with_seen(&seen);
+    let coverage = Coverage::new(&field, &table.views, &ids, RayDensity::FULL);
+    table.seen = Some(seen);
+    let decision = table.decide(PolicyKind::MemNoPush);
+    assert_eq!(decision.gains, coverage.gains());
+    let offered = |view: &ViewId| !table.history.used_views.contains(view);
+    let pair = coverage.best_pair(offered).expect("a pair");
+    assert_eq!(decision.action, Action::Look { view: pair.first });
+    assert_eq!(decision.pair, [pair.first, pair.second.expect("a second view")]);
+    // What a view's gain comes from is counted alike.
+    let sources = gain_sources(&field, &table.views, pair.first, RayDensity::FULL);
+    let sum: f64 = sources.iter().map(|(_, nats)| f64::from(*nats)).sum();
+    assert!((sum / f64::from(pair.first_gain) - 1.0).abs() < 1e-4, "{sum} {}", pair.first_gain);
 }
 
 #[test]

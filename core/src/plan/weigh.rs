@@ -1,6 +1,6 @@
 //! What pushes are worth: IGM and Reg of every candidate.
 
-use super::{CandidateRecord, Counted, PlannerSettings, Situation};
+use super::{CandidateRecord, Counted, PlannerSettings, Situation, look};
 use crate::arm::PushMotion;
 use crate::belief::{Belief, PushPrediction, SweptPush};
 use crate::camera::{ViewArray, ViewId};
@@ -68,7 +68,7 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
                 (candidates[at].view, candidates[at].gain) = (view, Some(gain));
             }
             Worth::Opened(_, coarse) => {
-                let gains = gain_of_views(&after, views, coarse, RayDensity::COARSE);
+                let gains = look::gains(&after, views, coarse, RayDensity::COARSE);
                 candidates[at].view = best_view(coarse, &gains).0;
             }
         }

@@ -10,8 +10,8 @@ use nudge_core::arm::Push;
 use nudge_core::belief::SweptPush;
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
-use nudge_core::gain::{RayDensity, gain_per_voxel};
-use nudge_core::plan::{Action, Decision, PolicyKind, Reason, gain_field};
+use nudge_core::gain::RayDensity;
+use nudge_core::plan::{Action, Decision, PolicyKind, Reason, gain_field, gain_sources};
 use nudge_core::push::swept_by;
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
@@ -382,7 +382,7 @@ impl App {
         self.asked_gain = Some((of, view));
         self.background.gain.ask(move |_| {
             let field = gain_field(&moment.belief.belief(), moment.seen.as_deref());
-            let nats = gain_per_voxel(&field, &views, view, RayDensity::FULL);
+            let nats = gain_sources(&field, &views, view, RayDensity::FULL);
             Some(GainSource::new(of, view, nats))
         });
     }

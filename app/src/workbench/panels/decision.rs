@@ -156,7 +156,10 @@ fn because(reason: Reason, planner: &PlannerSettings) -> String {
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
         Reason::TooEarly => steps("first", planner.quiet_steps),
         Reason::LastStep => steps("last", planner.closing_steps),
-        Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
+        Reason::JustPushed => match planner.closing_steps {
+            1 => "nothing is pushed right after a push".to_owned(),
+            looks => format!("{looks} looks follow a push before the next one"),
+        },
         Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),
         Reason::NoCandidate => "no push is feasible".to_owned(),
         Reason::Schedule => "the policy's schedule says so".to_owned(),

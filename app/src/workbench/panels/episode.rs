@@ -270,10 +270,10 @@ fn thresholds(ui: &mut egui::Ui, planner: &mut PlannerSettings) {
             .labelled_by(label.id)
             .on_hover_text("The first steps, in which nothing is pushed, 0 to 50; 3 in the paper");
         ui.end_row();
-        let label = ui.label("no push in the last");
-        ui.add(egui::DragValue::new(&mut planner.closing_steps).range(1..=50).suffix(" steps"))
+        let label = ui.label("looks after a push");
+        ui.add(egui::DragValue::new(&mut planner.closing_steps).range(1..=50))
             .labelled_by(label.id)
-            .on_hover_text("The last steps, in which nothing is pushed, 1 to 50; 1 in the paper");
+            .on_hover_text("So many looks follow a push before the next one, and at the end, 1 to 50; 1 in the paper");
         ui.end_row();
         let label = ui.label("patience");
         ui.add(egui::DragValue::new(&mut planner.patience).range(0.1..=100.0).speed(0.1))

@@ -9,7 +9,7 @@ use crate::workbench::model::{GainSource, Hovered, Model};
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::camera::{View, ViewArray, ViewId};
 use nudge_core::grid::Grid;
-use nudge_core::plan::Decision;
+use nudge_core::plan::{Counted, Decision};
 use rerun::external::egui::{
     self, Align2, Color32, Painter, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui, WidgetInfo, WidgetType,
     pos2, vec2,
@@ -66,7 +66,10 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         heading(
             ui,
             format!("Gain of every view before step {step}"),
-            "IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), nats",
+            match session.record.config.planner.counted {
+                Counted::All => "IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), nats",
+                Counted::Unseen => "IG(v) = Σ unseen voxels H(p)·max over rays Π(1 − p before), nats",
+            },
         );
         map.show(ui, &mut touched);
         ui.add_space(6.0);

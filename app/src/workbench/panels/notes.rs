@@ -111,7 +111,7 @@ fn totals(ui: &mut egui::Ui, judged: &[Judged]) {
 
 fn row(ui: &mut egui::Ui, step: usize, judged: &Judged, ask: &mut Vec<Command>) {
     let name = if judged.overruled.is_some() {
-        RichText::new(format!("{} ✎", judged.name)).strong()
+        RichText::new(format!("{} ✏", judged.name)).strong()
     } else {
         RichText::new(judged.name.as_str())
     };

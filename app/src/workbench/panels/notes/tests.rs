@@ -83,7 +83,7 @@ fn an_overruled_verdict_is_marked_and_counted() {
     drop(choices);
     harness.run_steps(3);
     assert!(has(&harness, &format!("{}\u{a0}found", found + 1)), "{:?}", harness.state().asked);
-    assert!(has(&harness, "1 overruled") && has(&harness, "✎"));
+    assert!(has(&harness, "1 overruled") && has(&harness, "✏"));
 }
 
 #[test]

@@ -3,7 +3,8 @@
 //! `IG(v) = sum_r sum_k H(p_rk) * prod_{j<k} (1 - p_rj)` over the rays `r` of view `v` and the voxels `k` along them
 //! (occlusion-aware VIG, Delmerico et al. 2018). Voxels surer than `p > 0.95` are opaque: they count as `p = 1`, so
 //! they carry no information and stop the ray. Voxels with `p < 0.05` are transparent: they count as `p = 0`. Shelf
-//! walls, board and ceiling are opaque; a ray that does not enter through the open front sees nothing.
+//! walls, board and ceiling are opaque; a ray that does not enter through the open front sees nothing. [`Coverage`] counts
+//! a voxel once instead of once for every ray that meets it.
 //!
 //! # How it is fast
 //!

@@ -275,6 +275,20 @@ fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
     table.settings = table.settings.counting(Counted::Unseen);
     table.seen = Some(VoxelSet::empty(&table.belief.grid));
     assert!((best_height(&table) - highest).abs() < 1e-6);
+
+    // It is worth it for what it sees past the front: with p = 0.5 everywhere nothing of the back half would be reached.
+    let nothing = VoxelSet::empty(&table.belief.grid);
+    let view = table.decide(PolicyKind::MemNoPush).pair[0];
+    let share_of_back = |field: &GainField| {
+        let grid = &table.belief.grid;
+        let sources = gain_sources(field, &table.views, view, RayDensity::FULL);
+        let behind = |voxel: usize| 2 * usize::from(grid.voxel(voxel).y) >= grid.dims[1];
+        let sum = |of: &dyn Fn(usize) -> bool| -> f32 { sources.iter().filter(|s| of(s.0)).map(|s| s.1).sum() };
+        sum(&behind) / sum(&|_| true)
+    };
+    let (standing, flat) = (gain_field(&table.belief, Some(&nothing)), GainField::new(&table.belief));
+    assert!(share_of_back(&standing) > 0.05, "{}", share_of_back(&standing));
+    assert!(share_of_back(&flat.with_seen(&nothing)) < 0.01);
 }
 
 #[test]

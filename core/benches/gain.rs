@@ -59,7 +59,7 @@ fn report(name: &str, belief: &Belief, array: &ViewArray) {
     let rays = best_of(3, || _ = black_box(gain_of_views(&seen, array, &all, density)));
     let coverage = best_of(3, || {
         let coverage = Coverage::new(&seen, array, &all, density);
-        black_box((coverage.gains(), coverage.best_pair(|_| true)));
+        black_box(coverage.best_pair(&coverage.gains(), |_| true));
     });
     print_row("all 300 views after three looks, by rays", rays, Some(0.30), "");
     print_row("  by coverage, with the best pair", coverage, Some(0.30), "");

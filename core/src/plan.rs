@@ -182,7 +182,7 @@ impl History {
 
     /// Whether the last action was a push.
     pub fn just_pushed(&self) -> bool {
-        matches!(self.actions.last(), Some(Action::Push(_)))
+        self.looks_since_push() == Some(0)
     }
 }
 

@@ -20,7 +20,8 @@ pub const CELL_M: f32 = 0.015;
 /// What each of some views covers under one field.
 pub struct Coverage<'a> {
     field: &'a GainField,
-    cells: Cells,
+    /// Number of the cell by position in the padded grid: 0 where it holds nothing unseen, and outside.
+    cells: Vec<u32>,
     /// `U_b` by cell, nats; nothing in the first.
     unseen: Vec<f32>,
     /// `T_b` by view, in the order of the ids, and cell.
@@ -31,9 +32,9 @@ pub struct Coverage<'a> {
 impl<'a> Coverage<'a> {
     /// Walks the rays of the given views. Parallel over views; the result does not depend on the number of threads.
     pub fn new(field: &'a GainField, array: &ViewArray, ids: &[ViewId], density: RayDensity) -> Self {
-        let (cells, unseen) = Cells::with_unseen(field);
+        let (cells, unseen) = numbered(field);
         let reach = |&id: &ViewId| {
-            let mut tally = Reach { cells: &cells.of, reached: vec![0.0; unseen.len()] };
+            let mut tally = Reach { cells: &cells, reached: vec![0.0; unseen.len()] };
             Camera::of(field, array, id).for_each_ray(field, density, |_, ray| ray.walk(field, &mut tally));
             tally.reached
         };
@@ -46,17 +47,17 @@ impl<'a> Coverage<'a> {
         self.reached.par_iter().map(|reached| self.sum(|cell| reached[cell])).collect()
     }
 
-    /// The greedy best pair of the views that are offered; `None` where none of them gains anything. The first of equals
-    /// wins.
-    pub fn best_pair(&self, offered: impl Fn(&ViewId) -> bool) -> Option<ViewPair> {
+    /// The greedy best pair of the views that are offered; `None` where none of them gains anything. `gains` are
+    /// [`Coverage::gains`]. The first of equals wins.
+    pub fn best_pair(&self, gains: &[f32], offered: impl Fn(&ViewId) -> bool) -> Option<ViewPair> {
         let open: Vec<usize> = (0..self.ids.len()).filter(|&at| offered(&self.ids[at])).collect();
-        let best = |gain: &(dyn Fn(usize) -> f32 + Sync)| {
-            let gains: Vec<(usize, f32)> = open.par_iter().map(|&at| (at, gain(at))).collect();
+        let best = |gains: Vec<(usize, f32)>| {
             gains.into_iter().filter(|(_, gain)| *gain > 0.0).reduce(|best, at| if at.1 > best.1 { at } else { best })
         };
-        let (first, first_gain) = best(&|at| self.sum(|cell| self.reached[at][cell]))?;
+        let (first, first_gain) = best(open.iter().map(|&at| (at, gains[at])).collect())?;
         let before = &self.reached[first];
-        let second = best(&|at| self.sum(|cell| (self.reached[at][cell] - before[cell]).max(0.0)));
+        let beyond = |at: usize| self.sum(|cell| (self.reached[at][cell] - before[cell]).max(0.0));
+        let second = best(open.par_iter().map(|&at| (at, beyond(at))).collect());
         Some(ViewPair {
             first: self.ids[first],
             first_gain,
@@ -70,7 +71,7 @@ impl<'a> Coverage<'a> {
     pub fn per_voxel(&self, at: usize) -> Vec<(usize, f32)> {
         let nats = |voxel: usize| {
             let padded = self.field.layout.padded(voxel);
-            self.field.unseen_information(padded) * self.reached[at][self.cells.of[padded] as usize]
+            self.field.unseen_information(padded) * self.reached[at][self.cells[padded] as usize]
         };
         let voxels = (0..self.field.grid().voxel_count()).map(|voxel| (voxel, nats(voxel)));
         voxels.filter(|(_, nats)| *nats > 0.0).collect()
@@ -82,42 +83,34 @@ impl<'a> Coverage<'a> {
     }
 }
 
-/// The cubes that hold something unseen.
-struct Cells {
-    /// Number of the cell by position in the padded grid: 0 where it holds nothing unseen, and outside.
-    of: Vec<u32>,
-}
-
-impl Cells {
-    /// Numbers the cells, and tells what is unseen in each of them.
-    fn with_unseen(field: &GainField) -> (Self, Vec<f32>) {
-        let grid = field.grid();
-        let voxels = (CELL_M / grid.voxel_m).round().max(1.0) as usize;
-        let along = grid.dims.map(|dim| dim.div_ceil(voxels));
-        let cube = |voxel: usize| {
-            let at = grid.voxel(voxel);
-            let [x, y, z] = [at.x, at.y, at.z].map(|at| usize::from(at) / voxels);
-            (x * along[1] + y) * along[2] + z
-        };
-        let mut nats = vec![0.0_f32; along.iter().product()];
-        for voxel in 0..grid.voxel_count() {
-            nats[cube(voxel)] += field.unseen_information(field.layout.padded(voxel));
-        }
-        let mut unseen = vec![0.0];
-        let number = |nats: &f32| {
-            if *nats <= 0.0 {
-                return 0;
-            }
-            unseen.push(*nats);
-            unseen.len() as u32 - 1
-        };
-        let numbers: Vec<u32> = nats.iter().map(number).collect();
-        let mut of = vec![0; field.codes.len()];
-        for voxel in 0..grid.voxel_count() {
-            of[field.layout.padded(voxel)] = numbers[cube(voxel)];
-        }
-        (Self { of }, unseen)
+/// Numbers the cells that hold something unseen, by position in the padded grid, from 1 on, and tells what is unseen in each.
+fn numbered(field: &GainField) -> (Vec<u32>, Vec<f32>) {
+    let grid = field.grid();
+    let voxels = (CELL_M / grid.voxel_m).round().max(1.0) as usize;
+    let along = grid.dims.map(|dim| dim.div_ceil(voxels));
+    let cube = |voxel: usize| {
+        let at = grid.voxel(voxel);
+        let [x, y, z] = [at.x, at.y, at.z].map(|at| usize::from(at) / voxels);
+        (x * along[1] + y) * along[2] + z
+    };
+    let mut nats = vec![0.0_f32; along.iter().product()];
+    for voxel in 0..grid.voxel_count() {
+        nats[cube(voxel)] += field.unseen_information(field.layout.padded(voxel));
     }
+    let mut unseen = vec![0.0];
+    let number = |nats: &f32| {
+        if *nats <= 0.0 {
+            return 0;
+        }
+        unseen.push(*nats);
+        unseen.len() as u32 - 1
+    };
+    let numbers: Vec<u32> = nats.iter().map(number).collect();
+    let mut cells = vec![0; field.codes.len()];
+    for voxel in 0..grid.voxel_count() {
+        cells[field.layout.padded(voxel)] = numbers[cube(voxel)];
+    }
+    (cells, unseen)
 }
 
 /// The largest transmittance with which a ray arrives in every cell.
@@ -211,7 +204,7 @@ mod tests {
             // The best of the views that are offered, then the one that adds most to it.
             let first = (0..ids.len()).max_by(|&a, &b| gains[a].total_cmp(&gains[b])).expect("views");
             for used in [None, Some(ids[first])] {
-                let pair = coverage.best_pair(|view| Some(*view) != used).expect("a pair");
+                let pair = coverage.best_pair(&gains, |view| Some(*view) != used).expect("a pair");
                 let at = |view: ViewId| ids.iter().position(|id| *id == view).expect("one of them");
                 let offered = || (0..ids.len()).filter(|&at| Some(ids[at]) != used);
                 assert!(offered().all(|at| gains[at] <= pair.first_gain) && Some(pair.first) != used);
@@ -222,7 +215,7 @@ mod tests {
                 close(pair.total(), both(at(pair.second.expect("a second view"))));
                 close(pair.total(), most);
             }
-            assert!(coverage.best_pair(|_| false).is_none());
+            assert!(coverage.best_pair(&gains, |_| false).is_none());
         }
     }
 
@@ -234,7 +227,7 @@ mod tests {
         let field = GainField::new(&patchy(grid, 1)).with_seen(&all);
         let coverage = Coverage::new(&field, &array, &[ViewId(3), ViewId(150)], RayDensity::COARSE);
         assert_eq!(coverage.gains(), [0.0, 0.0]);
-        assert!(coverage.best_pair(|_| true).is_none() && coverage.per_voxel(0).is_empty());
+        assert!(coverage.best_pair(&[0.0, 0.0], |_| true).is_none() && coverage.per_voxel(0).is_empty());
     }
 
     #[test]
@@ -246,7 +239,9 @@ mod tests {
             pool.install(|| {
                 let field = GainField::new(&patchy(grid, 8)).with_seen(&some(&grid));
                 let coverage = Coverage::new(&field, &array, &ids, RayDensity::COARSE);
-                (coverage.gains(), coverage.best_pair(|_| true))
+                let gains = coverage.gains();
+                let pair = coverage.best_pair(&gains, |_| true);
+                (gains, pair)
             })
         };
         assert_eq!(all(1), all(3));

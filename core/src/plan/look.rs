@@ -57,7 +57,9 @@ pub(super) fn gains_and_pair(
 ) -> (Vec<f32>, Option<ViewPair>) {
     if field.knows_seen() {
         let coverage = Coverage::new(field, array, ids, RayDensity::FULL);
-        return (coverage.gains(), coverage.best_pair(offered));
+        let gains = coverage.gains();
+        let pair = coverage.best_pair(&gains, offered);
+        return (gains, pair);
     }
     let gains = gain_of_views(field, array, ids, RayDensity::FULL);
     let fresh: Vec<f32> = ids.iter().zip(&gains).map(|(id, gain)| if offered(id) { *gain } else { 0.0 }).collect();

@@ -305,7 +305,7 @@ fn where_only_unseen_voxels_count_each_counts_once() {
     let decision = table.decide(PolicyKind::MemNoPush);
     assert_eq!(decision.gains, coverage.gains());
     let offered = |view: &ViewId| !table.history.used_views.contains(view);
-    let pair = coverage.best_pair(offered).expect("a pair");
+    let pair = coverage.best_pair(&decision.gains, offered).expect("a pair");
     assert_eq!(decision.action, Action::Look { view: pair.first });
     assert_eq!(decision.pair, [pair.first, pair.second.expect("a second view")]);
     // What a view's gain comes from is counted alike.

@@ -26,6 +26,8 @@ pub struct Chart {
     pub title: String,
     /// What the horizontal axis shows.
     pub x_title: String,
+    /// Whether the horizontal axis counts something, so that only whole numbers stand on it.
+    pub x_counts: bool,
     /// Ends of the horizontal axis.
     pub x_range: [f64; 2],
     /// Ends of the vertical axis.
@@ -62,7 +64,8 @@ impl Chart {
             svg.text(&text.anchored(Anchor::End).colored(SOFT_INK));
         }
         let floor = axes[1] + axes[3];
-        for (value, label) in counting_ticks(self.x_range, 8) {
+        let x_ticks = if self.x_counts { counting_ticks } else { nice_ticks };
+        for (value, label) in x_ticks(self.x_range, 8) {
             svg.line([x(value), floor], [x(value), floor + 3.0], Stroke::new(SOFT_INK, 0.9));
             let text = Text::new(label, [x(value), floor + 15.0], 11.0);
             svg.text(&text.anchored(Anchor::Middle).colored(SOFT_INK));
@@ -143,6 +146,7 @@ mod tests {
         let chart = Chart {
             title: "IoU".to_owned(),
             x_title: "step".to_owned(),
+            x_counts: true,
             x_range: [0.0, 10.0],
             y_range: [0.0, 1.0],
             series: vec![line("one", 0.80), line("two", 0.801), line("three", 0.802)],

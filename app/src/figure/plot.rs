@@ -61,11 +61,9 @@ impl Plot {
             push_mark(svg, [x(step), axes[1] - 6.0]);
         }
         svg.line([axes[0], axes[1] + axes[3]], [axes[0] + axes[2], axes[1] + axes[3]], Stroke::new(SOFT_INK, 0.9));
-        for (step, label) in nice_ticks([0.0, self.steps.max(1) as f64], 6) {
-            if step.fract() == 0.0 {
-                let at = [x(step as usize), axes[1] + axes[3] + 14.0];
-                svg.text(&Text::new(label, at, 10.5).anchored(Anchor::Middle).colored(SOFT_INK));
-            }
+        for (step, label) in counting_ticks([0.0, self.steps.max(1) as f64], 6) {
+            let at = [x(step as usize), axes[1] + axes[3] + 14.0];
+            svg.text(&Text::new(label, at, 10.5).anchored(Anchor::Middle).colored(SOFT_INK));
         }
         let at = [axes[0] + 0.5 * axes[2], axes[1] + axes[3] + 27.0];
         svg.text(&Text::new("step", at, 10.5).anchored(Anchor::Middle).colored(SOFT_INK));
@@ -114,9 +112,10 @@ pub fn nice_ticks(range: [f64; 2], count: usize) -> Vec<(f64, String)> {
     ticks(range, count, &[1.0, 2.0, 2.5, 5.0, 10.0])
 }
 
-/// The same for what is counted: from 1 on they are whole numbers.
-pub fn counting_ticks(range: [f64; 2], count: usize) -> Vec<(f64, String)> {
-    ticks(range, count, &[1.0, 2.0, 5.0, 10.0])
+/// The same for what is counted: whole numbers only.
+pub fn counting_ticks([low, high]: [f64; 2], count: usize) -> Vec<(f64, String)> {
+    let count = count.min((high - low).ceil().max(1.0) as usize);
+    ticks([low, high], count, &[1.0, 2.0, 5.0, 10.0])
 }
 
 /// Multiples of one of `steps`, or of its tenths, tens and so on.
@@ -149,7 +148,9 @@ mod tests {
         assert_eq!(labels([0.0, 1.0], 6), "0.0 0.2 0.4 0.6 0.8 1.0");
         assert_eq!(nice_ticks([2.0, 2.0], 4).len(), 1);
         assert_eq!(labels([1.0, 20.0], 8), "2.5 5.0 7.5 10.0 12.5 15.0 17.5 20.0");
-        let counted: Vec<String> = counting_ticks([1.0, 20.0], 8).into_iter().map(|t| t.1).collect();
-        assert_eq!(counted, ["5", "10", "15", "20"]);
+        let counted = |range| counting_ticks(range, 8).into_iter().map(|t| t.1).collect::<Vec<_>>().join(" ");
+        assert_eq!(counted([1.0, 20.0]), "5 10 15 20");
+        assert_eq!(counted([1.0, 5.0]), "1 2 3 4 5", "no half of a step");
+        assert_eq!(counted([0.0, 1.0]), "0 1");
     }
 }

@@ -57,6 +57,7 @@ fn over_steps(results: &Results, set: usize, metric: Metric) -> Figure {
         chart: Chart {
             title: format!("{name}: {}", metric.title()),
             x_title: "step".to_owned(),
+            x_counts: true,
             x_range: [1.0, budget.max(2) as f64],
             y_range: range(&series, metric),
             series,
@@ -100,6 +101,7 @@ fn reliability(results: &Results, set: usize, what: &str, of: impl Fn(&Cell) -> 
         chart: Chart {
             title: format!("{name}: reliability of {what}"),
             x_title: "confidence".to_owned(),
+            x_counts: false,
             x_range: [lowest, 1.0],
             y_range: [0.0, 1.0],
             series,

@@ -8,7 +8,8 @@ use crate::workbench::command::Command;
 use crate::workbench::model::{Hovered, Model};
 use crate::workbench::session::{Activity, Session};
 use nudge_core::camera::ViewId;
-use nudge_core::plan::{Action, Decision, PlannerSettings, Reason};
+use nudge_core::episode::EpisodeConfig;
+use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason};
 use rerun::external::egui::{self, Button, RichText, Ui};
 
 /// What the panel remembers.
@@ -46,7 +47,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
     };
     ui.spacing_mut().item_spacing.y = 4.0;
     header(ui, session, model.cursor);
-    verdict(ui, decision, &session.record.config.planner);
+    verdict(ui, decision, &session.record.config);
     ui.add_space(4.0);
     views(state, ui, model, session, decision, &mut touched, ask);
     ui.add_space(4.0);
@@ -86,7 +87,8 @@ fn header(ui: &mut Ui, session: &Session, cursor: usize) {
 }
 
 /// Looking against pushing, as bars on one scale, and what follows.
-fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
+fn verdict(ui: &mut Ui, decision: &Decision, config: &EpisodeConfig) {
+    let planner = &config.planner;
     let (gamma, patience) = (planner.gamma, planner.patience);
     let (look, push) = (decision.igv, decision.igm + gamma * decision.reg);
     let weighed = decision.best_push.is_some() && decision.igm != 0.0;
@@ -140,11 +142,11 @@ fn verdict(ui: &mut Ui, decision: &Decision, planner: &PlannerSettings) {
     ui.add_space(2.0);
     let what = words::capital(&words::action(&decision.action));
     ui.label(RichText::new(what).strong().heading().size(15.0));
-    ui.label(format!("because {}", because(decision.reason, planner)));
+    ui.label(format!("because {}", because(decision.reason, config.policy, planner)));
 }
 
 /// A reason as the end of a sentence.
-fn because(reason: Reason, planner: &PlannerSettings) -> String {
+fn because(reason: Reason, policy: PolicyKind, planner: &PlannerSettings) -> String {
     let steps = |which: &str, count: usize| match count {
         1 => format!("nothing is pushed in the {which} step"),
         count => format!("nothing is pushed in the {which} {count} steps"),
@@ -156,10 +158,10 @@ fn because(reason: Reason, planner: &PlannerSettings) -> String {
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
         Reason::TooEarly => steps("first", planner.quiet_steps),
         Reason::LastStep => steps("last", planner.closing_steps),
-        Reason::JustPushed => match planner.closing_steps {
-            1 => "nothing is pushed right after a push".to_owned(),
-            looks => format!("{looks} looks follow a push before the next one"),
-        },
+        Reason::JustPushed if policy == PolicyKind::Mem && planner.closing_steps > 1 => {
+            format!("{} looks follow a push before the next one", planner.closing_steps)
+        }
+        Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
         Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),
         Reason::NoCandidate => "no push is feasible".to_owned(),
         Reason::Schedule => "the policy's schedule says so".to_owned(),
@@ -299,4 +301,18 @@ fn do_instead(ui: &mut Ui, session: &Session, cursor: usize, name: &str, title: 
     button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, hindrance.is_none(), name));
     let button = button.on_hover_text("Does this in place of what the policy would do");
     button.on_disabled_hover_text(hindrance.unwrap_or_default()).clicked()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Only `mem` waits for all the looks that close a push; schedules keep to one.
+    #[test]
+    fn after_a_push_the_reason_says_what_the_policy_does() {
+        let planner = PlannerSettings { closing_steps: 4, ..PlannerSettings::default() };
+        let said = |policy| because(Reason::JustPushed, policy, &planner);
+        assert_eq!(said(PolicyKind::Mem), "4 looks follow a push before the next one");
+        assert_eq!(said(PolicyKind::Saturation), "nothing is pushed right after a push");
+    }
 }

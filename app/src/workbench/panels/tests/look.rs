@@ -4,8 +4,9 @@
 use super::{Show, Stage};
 use crate::workbench::fixture::{self, Script};
 use crate::workbench::model::{LayoutKind, Model, Picked};
-use crate::workbench::panels::{self, camera, compare, curves, decision, gains, maps, push, weighed, why};
+use crate::workbench::panels::{self, camera, compare, curves, decision, episode, gains, maps, push, weighed, why};
 use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::plan::{PlannerSettings, PolicyKind};
@@ -43,7 +44,7 @@ fn pictures() {
     let out =
         std::env::var_os("NUDGE_PICTURES").map_or_else(|| std::env::temp_dir().join("nudge-panels"), PathBuf::from);
     std::fs::create_dir_all(&out).expect("directory");
-    let shots: [(&str, Show, [f32; 2], usize); 10] = [
+    let shots: [(&str, Show, [f32; 2], usize); 11] = [
         ("maps", maps::show, [520.0, 640.0], 8),
         ("camera", camera::show, [520.0, 260.0], 8),
         ("curves", curves::show, [900.0, 190.0], 7),
@@ -54,6 +55,7 @@ fn pictures() {
         ("push", push::show, [620.0, 1150.0], 5),
         ("push-done", push::show, [620.0, 900.0], 6),
         ("compare", compare::show, [900.0, 640.0], 8),
+        ("new-episode", episode::show, [236.0, 900.0], 8),
     ];
     let only = std::env::var("NUDGE_ONLY").unwrap_or_default();
     let mut model = crowded();
@@ -78,6 +80,12 @@ fn pictures() {
             let mut harness =
                 Harness::builder().with_size(size).with_pixels_per_point(2.0).wgpu().build_ui_state(draw, stage);
             harness.run_steps(8);
+            if name == "new-episode" {
+                for section in ["New episode", "Thresholds"] {
+                    harness.get_by_label(section).click();
+                    harness.run_steps(20);
+                }
+            }
             let theme = if theme == egui::Theme::Dark { "dark" } else { "light" };
             harness.render().expect("rendered").save(out.join(format!("{name}-{theme}.png"))).expect("written");
             let stage = harness.into_state();

@@ -32,15 +32,15 @@ pub mod worker;
 #[cfg(test)]
 mod fixture;
 
-use rerun::external::eframe;
-use rerun::external::egui;
+use re_viewer::external::eframe;
+use re_viewer::external::egui;
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
 /// When there is no display, or no temporary folder for a window that remembers nothing.
 pub fn run(options: app::Options) -> Result<(), String> {
-    let mut native = rerun::external::re_viewer::native::eframe_options(None);
+    let mut native = re_viewer::native::eframe_options(None);
     native.viewport = egui::ViewportBuilder::default()
         .with_app_id("nudge")
         .with_title("Nudge")

@@ -10,7 +10,7 @@ use nudge::workbench::command::Command;
 use nudge::workbench::half_belief::HalfBelief;
 use nudge::workbench::session::Moment;
 use nudge_tests::{nudge_bin, root};
-use rerun::external::{egui, re_viewer};
+use re_viewer::external::egui;
 use std::process::Stdio;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -22,7 +22,7 @@ use super::worker::{Event, Worker};
 use nudge_core::camera::ViewId;
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
-use rerun::external::{eframe, egui};
+use re_viewer::external::{eframe, egui};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, Sender, channel};

@@ -6,7 +6,7 @@ use super::latest::Wake;
 use crate::picture::{self, RgbImage, View};
 use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::scene::{Catalog, Scene};
-use rerun::external::egui::TextureHandle;
+use re_viewer::external::egui::TextureHandle;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};

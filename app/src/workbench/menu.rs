@@ -3,7 +3,7 @@
 use super::command::MenuCommand as M;
 use super::model::{LayoutKind, Model};
 use super::session::{Activity, Session};
-use rerun::external::egui::{Key, KeyboardShortcut, Modifiers};
+use re_viewer::external::egui::{Key, KeyboardShortcut, Modifiers};
 
 /// A menu with its entries; `None` is a line between them.
 pub const MENUS: [(&str, &[Option<M>]); 5] = [

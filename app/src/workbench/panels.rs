@@ -41,7 +41,7 @@ mod tests;
 use super::model::{Hovered, Model};
 use super::session::SessionId;
 use nudge_core::camera::ViewId;
-use rerun::external::egui;
+use re_viewer::external::egui;
 
 /// What the panels remember from frame to frame.
 #[derive(Default)]

@@ -7,7 +7,7 @@ use egui_kittest::Harness;
 use image::RgbImage;
 use nudge_core::plan::Action;
 use nudge_core::{Error, Result};
-use rerun::external::{egui, re_viewer};
+use re_viewer::external::egui;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

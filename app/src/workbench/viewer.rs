@@ -7,10 +7,10 @@
 mod linked;
 
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
-use rerun::external::re_viewer::external::re_ui::{
+use re_viewer::external::re_ui::{
     RecordingCommand, RecordingCommandKind, RecordingCommandSender as _,
 };
-use rerun::external::{eframe, egui, re_log_channel, re_log_types, re_viewer, tokio};
+use re_viewer::external::{eframe, egui, re_log_channel, re_log_types, tokio};
 use rerun::grpc_server::GrpcServerSink;
 use rerun::sink::LogSink as _;
 use rerun::{RecordingStream, RecordingStreamBuilder};
@@ -178,7 +178,7 @@ impl Viewer {
     pub fn close_recording(&mut self) {
         self.is_foreign.store(false, Ordering::Relaxed);
         self.asked = None;
-        use rerun::external::re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
+        use re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
         let own = re_log_types::ApplicationId::from(APPLICATION);
         self.app.command_sender.send_system(SystemCommand::ActivateApp(own));
     }

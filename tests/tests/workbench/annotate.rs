@@ -3,8 +3,8 @@
 use super::window::Window;
 use nudge::workbench::command::Command;
 use nudge_core::score::Verdict;
-use rerun::external::egui::accesskit::Role;
-use rerun::external::egui::{Key, Modifiers, ViewportCommand};
+use re_viewer::external::egui::accesskit::Role;
+use re_viewer::external::egui::{Key, Modifiers, ViewportCommand};
 use std::path::PathBuf;
 
 /// What was exported, by its ending.

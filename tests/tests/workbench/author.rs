@@ -5,7 +5,7 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use nudge::workbench::model::LayoutKind;
 use nudge_core::scene::{Catalog, Scene};
 use nudge_tests::root;
-use rerun::external::egui::{Key, Modifiers};
+use re_viewer::external::egui::{Key, Modifiers};
 use std::path::Path;
 
 /// A window whose scenes are an empty folder of its own.

@@ -4,8 +4,8 @@ use super::window::Window;
 use egui_kittest::kittest::{NodeT, Queryable};
 use nudge::workbench::command::Command;
 use nudge::workbench::model::{LayoutKind, Picked};
-use rerun::external::egui::accesskit::Role;
-use rerun::external::egui::{Key, Modifiers};
+use re_viewer::external::egui::accesskit::Role;
+use re_viewer::external::egui::{Key, Modifiers};
 
 #[test]
 fn an_empty_window_says_what_to_do() {

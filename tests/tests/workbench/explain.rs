@@ -6,8 +6,8 @@ use nudge::workbench::command::Command;
 use nudge::workbench::model::{Hovered, LayoutKind, Picked};
 use nudge_core::camera::ViewId;
 use nudge_core::plan::Action;
-use rerun::external::egui::accesskit::Role;
-use rerun::external::egui::{Key, Modifiers};
+use re_viewer::external::egui::accesskit::Role;
+use re_viewer::external::egui::{Key, Modifiers};
 
 #[test]
 fn a_cell_and_a_voxel_are_asked_about_by_pointer_and_by_key() {

@@ -3,7 +3,7 @@
 use super::window::{SCENE, Window};
 use nudge::workbench::command::Command;
 use nudge_tests::root;
-use rerun::external::egui::{self, Event, Key, Modifiers, PointerButton, pos2, vec2};
+use re_viewer::external::egui::{self, Event, Key, Modifiers, PointerButton, pos2, vec2};
 
 #[test]
 fn two_thousand_random_events_never_panic() {

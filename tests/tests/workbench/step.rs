@@ -7,7 +7,7 @@ use nudge::workbench::session::Activity;
 use nudge_core::camera::ViewId;
 use nudge_core::plan::{Action, Reason};
 use nudge_tests::root;
-use rerun::external::egui::{self, Key, Modifiers};
+use re_viewer::external::egui::{self, Key, Modifiers};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

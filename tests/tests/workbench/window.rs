@@ -8,7 +8,7 @@ use nudge::workbench::model::{LayoutKind, Model};
 use nudge::workbench::session::Session;
 use nudge_core::plan::PolicyKind;
 use nudge_tests::root;
-use rerun::external::egui::{self, Key, Modifiers, vec2};
+use re_viewer::external::egui::{self, Key, Modifiers, vec2};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 use std::time::{Duration, Instant};

@@ -6,8 +6,8 @@ use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
 use crate::workbench::panels;
-use rerun::external::re_viewer::external::re_ui::RecordingCommandKind;
-use rerun::external::{eframe, egui};
+use re_viewer::external::re_ui::RecordingCommandKind;
+use re_viewer::external::{eframe, egui};
 use std::time::Instant;
 
 impl App {

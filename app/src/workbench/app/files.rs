@@ -10,7 +10,7 @@ use crate::workbench::model::LayoutKind;
 use crate::workbench::session::{Session, SessionId};
 use crate::workbench::threads;
 use crate::workbench::worker::Begin;
-use rerun::external::egui;
+use re_viewer::external::egui;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

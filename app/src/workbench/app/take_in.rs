@@ -10,7 +10,7 @@ use crate::workbench::session::{Activity, Session, SessionId};
 use crate::workbench::space::{Side, Space};
 use crate::workbench::viewer::{Clicked, Viewer};
 use crate::workbench::worker::{Event, Opened};
-use rerun::external::egui;
+use re_viewer::external::egui;
 use std::sync::{Arc, PoisonError};
 
 /// Frames after everything is done before a script's picture is taken, so that what was logged is drawn.

@@ -4,7 +4,7 @@ use super::floor::Frame;
 use super::legend;
 use nudge_core::arm::Push;
 use nudge_core::plan::CandidateRecord;
-use rerun::external::egui::{self, Color32, Painter, Pos2, Shape, Stroke, Ui, Vec2};
+use re_viewer::external::egui::{self, Color32, Painter, Pos2, Shape, Stroke, Ui, Vec2};
 
 /// How near the pointer has to be to an arrow, points.
 const NEAR: f32 = 7.0;

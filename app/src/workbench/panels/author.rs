@@ -12,7 +12,7 @@ use crate::workbench::author::{Author, Choose};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::model::Model;
 use nudge_core::scene::ClassId;
-use rerun::external::egui::{self, Key, KeyboardShortcut, Modifiers};
+use re_viewer::external::egui::{self, Key, KeyboardShortcut, Modifiers};
 use std::sync::Arc;
 
 /// Draws the editor over the whole of `ui`.

@@ -9,7 +9,7 @@ use crate::workbench::model::Model;
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::camera::{Image, UNOBSERVED};
 use nudge_core::scene::{CLASS_COUNT, ClassId};
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     self, Color32, ColorImage, Pos2, Rect, Sense, Stroke, StrokeKind, TextureFilter, TextureHandle, TextureOptions,
     Tooltip, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };

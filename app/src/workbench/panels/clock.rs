@@ -3,7 +3,7 @@
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::Model;
 use nudge_core::plan::Action;
-use rerun::external::egui;
+use re_viewer::external::egui;
 
 /// Draws the clock.
 pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {

@@ -12,7 +12,7 @@ use crate::workbench::derive::{Derived, MapKind};
 use crate::workbench::model::{Model, Picked};
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::plan::Action;
-use rerun::external::egui::{self, ColorImage, ComboBox, Label, RichText, TextureHandle, Ui};
+use re_viewer::external::egui::{self, ColorImage, ComboBox, Label, RichText, TextureHandle, Ui};
 use std::sync::Arc;
 
 /// Pixels along a cell of the difference map, so that there is room to hatch.

@@ -10,7 +10,7 @@ use crate::workbench::session::{Activity, Session};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason};
-use rerun::external::egui::{self, Button, RichText, Ui};
+use re_viewer::external::egui::{self, Button, RichText, Ui};
 
 /// What the panel remembers.
 pub struct State {

@@ -4,7 +4,7 @@ use super::{legend, words};
 use crate::colors::{self, Colormap, Rgb};
 use crate::workbench::command::Command;
 use crate::workbench::model::{ColourBy, EVERYWHERE_M, LayoutKind, Model};
-use rerun::external::egui;
+use re_viewer::external::egui;
 
 /// Draws the choices below the three-dimensional views. `drawn` is the number of voxels that are shown.
 pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<Command>) {

@@ -6,7 +6,7 @@ use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session};
 use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
 use nudge_core::push::PushSampler;
-use rerun::external::egui;
+use re_viewer::external::egui;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 

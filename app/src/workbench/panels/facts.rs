@@ -1,7 +1,7 @@
 //! Numbers with their names, in columns.
 
 use super::words;
-use rerun::external::egui::{Grid, RichText, Ui};
+use re_viewer::external::egui::{Grid, RichText, Ui};
 
 /// A number or a word with its name.
 pub struct Fact {

@@ -5,7 +5,7 @@ use nudge_core::Point;
 use nudge_core::grid::{Grid, Window};
 use nudge_core::scene::Body;
 use nudge_core::solid::convex_outline;
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     Color32, Painter, Pos2, Rect, Response, Sense, Shape, Stroke, StrokeKind, TextureHandle, Tooltip, Ui, WidgetInfo,
     WidgetType, pos2, vec2,
 };

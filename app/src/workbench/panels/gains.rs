@@ -10,7 +10,7 @@ use crate::workbench::session::{Session, SessionId};
 use nudge_core::camera::{View, ViewArray, ViewId};
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Counted, Decision};
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     self, Align2, Color32, Painter, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui, WidgetInfo, WidgetType,
     pos2, vec2,
 };

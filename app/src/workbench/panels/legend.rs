@@ -1,7 +1,7 @@
 //! Legends: colour bars with numbers and units, and swatches with names.
 
 use crate::colors::Rgb;
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     self, Align2, Color32, FontId, Mesh, Response, Sense, Shape, Stroke, StrokeKind, TextStyle, Ui, WidgetInfo,
     WidgetType, pos2, vec2,
 };

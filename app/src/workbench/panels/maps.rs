@@ -15,7 +15,7 @@ use nudge_core::grid::Grid;
 use nudge_core::scene::{BACKGROUND, Catalog, ClassId};
 use nudge_core::score::SCORED_HEIGHT_M;
 use nudge_core::world::TruthMap;
-use rerun::external::egui::{self, RichText, Slider, Ui};
+use re_viewer::external::egui::{self, RichText, Slider, Ui};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 

@@ -5,7 +5,7 @@ use super::{heading, words};
 use crate::record::mishaps;
 use crate::workbench::session::{Moment, SessionId};
 use nudge_core::episode::StepOutcome;
-use rerun::external::egui::{self, Ui};
+use re_viewer::external::egui::{self, Ui};
 
 /// What the panel remembers: which step is scrubbed, and how far, seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

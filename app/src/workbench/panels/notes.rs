@@ -8,7 +8,7 @@ use crate::workbench::command::Command;
 use crate::workbench::model::Model;
 use crate::workbench::session::Session;
 use nudge_core::score::Verdict;
-use rerun::external::egui::{self, Align, Color32, Layout, RichText};
+use re_viewer::external::egui::{self, Align, Color32, Layout, RichText};
 
 /// How much of a note the list shows.
 const EXCERPT: usize = 80;

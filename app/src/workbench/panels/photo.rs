@@ -2,8 +2,8 @@
 //! `NUDGE_PICTURES` names. In the window's style, at twice the resolution.
 
 use egui_kittest::Harness;
-use rerun::external::egui;
-use rerun::external::re_viewer::external::re_ui;
+use re_viewer::external::egui;
+use re_viewer::external::re_ui;
 use std::path::PathBuf;
 
 /// Draws `stage` in both themes until `is_ready` (or two minutes have gone), and writes `NAME-dark.png` and

@@ -21,7 +21,7 @@ use nudge_core::arm::Push;
 use nudge_core::belief::{MOST_SURPRISING, PushPrediction};
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, CandidateRecord, Decision};
-use rerun::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
+use re_viewer::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
 use std::sync::Arc;
 
 /// How much of the robot's side is shown, metres.

@@ -6,7 +6,7 @@ use crate::workbench::session::{Moment, SessionId};
 use nudge_core::belief::PushPrediction;
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::grid::Grid;
-use rerun::external::egui::Ui;
+use re_viewer::external::egui::Ui;
 
 /// A floor cell whose predicted probability of change is above this is predicted to change.
 const CHANGES: f32 = 0.5;

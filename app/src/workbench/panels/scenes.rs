@@ -9,7 +9,7 @@ use crate::workbench::browser::{Browser, Entry, Look};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::latest::Wake;
 use crate::workbench::model::{LayoutKind, Model};
-use rerun::external::egui::{self, Color32, FontId, Pos2, Rect, Sense, StrokeKind, Vec2, WidgetInfo, WidgetType};
+use re_viewer::external::egui::{self, Color32, FontId, Pos2, Rect, Sense, StrokeKind, Vec2, WidgetInfo, WidgetType};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
 //! Small drawings: a value over the steps, and bars.
 
 use super::legend;
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     self, Align2, Color32, Response, Sense, Shape, Stroke, StrokeKind, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 

@@ -2,7 +2,7 @@
 
 use super::words;
 use egui_extras::{Column as Width, TableBuilder};
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     Align, Button, Color32, Label, Layout, RichText, Sense, TextStyle, Ui, Vec2b, WidgetInfo, WidgetType,
 };
 

@@ -1,7 +1,7 @@
 //! Pictures on the graphics card, by what they show: painted once, kept while they may be asked for again.
 
 use crate::picture::RgbImage;
-use rerun::external::egui::{ColorImage, Context, TextureHandle, TextureOptions};
+use re_viewer::external::egui::{ColorImage, Context, TextureHandle, TextureOptions};
 
 /// How many pictures of a panel are kept: enough to step back and forth without painting again.
 const KEPT: usize = 32;
@@ -52,7 +52,7 @@ pub fn of_rgb(picture: &RgbImage) -> ColorImage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rerun::external::egui::Color32;
+    use re_viewer::external::egui::Color32;
 
     #[test]
     fn a_picture_is_painted_once_and_the_oldest_go() {

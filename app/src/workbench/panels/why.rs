@@ -14,7 +14,7 @@ use nudge_core::belief::{bernoulli_entropy, beta_mean, beta_variance, dirichlet_
 use nudge_core::grid::Grid;
 use nudge_core::scene::ClassId;
 use nudge_core::score::SCORED_HEIGHT_M;
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     self, Align, Align2, Button, Label, Layout, Pos2, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui,
     WidgetInfo, WidgetType, pos2, vec2,
 };

@@ -6,7 +6,7 @@ use crate::workbench::dialog::{Dialog, Reply};
 use crate::workbench::session::SessionId;
 use crate::workbench::tasks::Task;
 use crate::workbench::toasts::Toasts;
-use rerun::external::{egui, re_viewer};
+use re_viewer::external::egui;
 use std::path::{Path, PathBuf};
 
 /// Draws an open question; the answer, once there is one.

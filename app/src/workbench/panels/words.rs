@@ -3,7 +3,7 @@
 pub(crate) use crate::record::decision::{action, capital, reason, thousands};
 
 use nudge_core::grid::{Cell, Grid, Voxel};
-use rerun::external::egui::{RichText, TextStyle};
+use re_viewer::external::egui::{RichText, TextStyle};
 
 /// What stands where a number is not one.
 const NO_NUMBER: &str = "n/a";

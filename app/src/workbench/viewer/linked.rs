@@ -12,7 +12,7 @@ use re_viewer_context::{
 };
 use re_viewport_blueprint::ViewProperty;
 use rerun::components::{Position3D, Vector3D};
-use rerun::external::re_viewer::external::{re_sdk_types, re_view_spatial, re_viewer_context, re_viewport_blueprint};
+use re_viewer::external::{re_sdk_types, re_view_spatial, re_viewer_context, re_viewport_blueprint};
 use std::sync::{Mutex, PoisonError};
 
 /// The kind of view that is linked.

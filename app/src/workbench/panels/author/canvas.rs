@@ -6,7 +6,7 @@ use super::{Carried, choice};
 use crate::workbench::author::{Author, Choose, Gesture, Snap, name};
 use draw::Ink;
 use nudge_core::scene::{Shelf, outline};
-use rerun::external::egui::{self, CursorIcon, Pos2, Rect, Sense, Vec2, WidgetInfo, WidgetType};
+use re_viewer::external::egui::{self, CursorIcon, Pos2, Rect, Sense, Vec2, WidgetInfo, WidgetType};
 
 /// Room around the board for its scale, points.
 const MARGIN: Vec2 = Vec2::new(44.0, 40.0);

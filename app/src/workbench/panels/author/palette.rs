@@ -3,7 +3,7 @@
 use super::{Carried, colour};
 use crate::colors;
 use crate::workbench::author::Author;
-use rerun::external::egui::{self, Align2, Sense, TextStyle, WidgetInfo, WidgetType};
+use re_viewer::external::egui::{self, Align2, Sense, TextStyle, WidgetInfo, WidgetType};
 
 const ROW_HEIGHT: f32 = 34.0;
 const SWATCH: f32 = 16.0;

@@ -4,7 +4,7 @@ use super::{colour, named};
 use crate::colors;
 use crate::workbench::author::{Author, Choose, Edit, name, normal_angle, rounded};
 use nudge_core::scene::Object;
-use rerun::external::egui::{self, DragValue, RichText};
+use re_viewer::external::egui::{self, DragValue, RichText};
 use std::ops::RangeInclusive;
 
 /// Hidden or broken objects that are listed.

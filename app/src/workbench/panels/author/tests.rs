@@ -4,7 +4,7 @@ use crate::workbench::panels::photo;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use nudge_core::scene::Scene;
-use rerun::external::egui::{Modifiers, Pos2, Vec2};
+use re_viewer::external::egui::{Modifiers, Pos2, Vec2};
 
 struct Stage {
     model: Model,

@@ -3,7 +3,7 @@
 use super::{DELETE, DUPLICATE, REDO, ROTATE, SAVE, UNDO, named};
 use crate::workbench::author::{Author, Snap};
 use crate::workbench::command::{Command, MenuCommand};
-use rerun::external::egui::{self, KeyboardShortcut};
+use re_viewer::external::egui::{self, KeyboardShortcut};
 
 /// Draws the row of buttons, with the scene's name above.
 pub(super) fn show(ui: &mut egui::Ui, author: &mut Author, ask: &mut Vec<Command>) {

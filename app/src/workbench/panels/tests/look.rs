@@ -11,8 +11,8 @@ use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::plan::{PlannerSettings, PolicyKind};
 use nudge_core::scene::{Catalog, Scene};
-use rerun::external::egui;
-use rerun::external::re_viewer::external::re_ui;
+use re_viewer::external::egui;
+use re_viewer::external::re_ui;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

@@ -4,7 +4,7 @@ use super::super::colour;
 use super::Board;
 use crate::workbench::author::{Author, Gesture};
 use nudge_core::scene::Shelf;
-use rerun::external::egui::{
+use re_viewer::external::egui::{
     self, Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2,
 };
 

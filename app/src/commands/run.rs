@@ -11,6 +11,7 @@ use nudge_core::scene::{Catalog, Scene};
 use nudge_core::score::{Scores, Verdict};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Instant;
 
 /// What was typed.
 #[derive(clap::Args, Debug)]
@@ -44,6 +45,7 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    let started = Instant::now();
     args.planning.device.choose()?;
     let catalog = Arc::new(Catalog::standard());
     let (scene, warnings) = Scene::load(&args.scene, &catalog)?;
@@ -79,6 +81,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Driver::start(scene, catalog, config, update, &out, overwrite)?
     };
 
+    let repeated = driver.episode().record().steps.len();
+    for warning in &driver.episode().arm().arm.warnings {
+        super::warn(&format!("{}: {warning}", driver.episode().arm().arm.name));
+    }
     if let Some(why) = driver.episode().why_no_push() {
         super::warn(&why);
     }
@@ -105,7 +111,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if args.json {
         super::print(&episode.record().to_json())?;
     } else {
-        print_summary(episode.record(), &out);
+        let steps_s: f64 = episode.record().steps[repeated..].iter().map(|step| step.seconds.total()).sum();
+        print_summary(episode.record(), &out, started.elapsed().as_secs_f64() - steps_s);
     }
     Ok(())
 }
@@ -200,7 +207,8 @@ fn action_words(step: &StepRecord) -> String {
     }
 }
 
-fn print_summary(record: &EpisodeRecord, out: &std::path::Path) {
+/// `rest_s` is what the command took beside its steps: getting ready, repeating what was logged, finishing.
+fn print_summary(record: &EpisodeRecord, out: &std::path::Path, rest_s: f64) {
     let Some(last) = record.steps.last() else { return };
     let count = |verdict: Verdict| last.objects.iter().filter(|object| object.verdict == verdict).count();
     let pushes = record.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).count();
@@ -229,8 +237,8 @@ fn print_summary(record: &EpisodeRecord, out: &std::path::Path) {
     println!("  moved, dropped       {displaced:.2} m, {dropped}");
     println!("  the arm moved        {:.0} s of its own time", seconds(|step| step.motion_s));
     println!(
-        "  time                 {:.1} s: decide {:.1}, act {:.1}, update {:.1}, record {:.1}",
-        seconds(|step| step.seconds.total()),
+        "  time                 {:.1} s: decide {:.1}, act {:.1}, update {:.1}, record {:.1}, the rest {rest_s:.1}",
+        seconds(|step| step.seconds.total()) + rest_s,
         seconds(|step| step.seconds.decide),
         seconds(|step| step.seconds.act),
         seconds(|step| step.seconds.update),

@@ -113,7 +113,6 @@ pub fn main() -> ExitCode {
 
 /// Writes a result to standard output. Always `Ok`, so that a command can end with it: what is wrong with the output is
 /// told when the work is done.
-#[expect(clippy::unnecessary_wraps, reason = "commands end with it")]
 fn print(text: &str) -> anyhow::Result<()> {
     crate::output::print(text);
     Ok(())

@@ -79,7 +79,7 @@ fn usual<'r>(tree: &Tree<'r>, names: &[&str]) -> Vec<&'r str> {
 
 fn link<'r>(tree: &Tree<'r>, what: &str, name: &str, path: &Path) -> Result<&'r str> {
     match tree.links.get_key_value(name) {
-        Some((link, _)) => Ok(link),
+        Some((link, _)) => Ok(*link),
         None => {
             let all: Vec<&str> = tree.links.keys().copied().collect();
             let message = format!("has no link `{name}`, which is named as its {what}; there are {}", listed(&all));

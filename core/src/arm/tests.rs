@@ -1,8 +1,8 @@
 use super::*;
+use crate::Result;
 use crate::grid::VoxelSet;
 use crate::rng::stream;
 use crate::scene::{RobotFile, RobotPlacement, Shelf};
-use crate::Result;
 use nalgebra::{Matrix4, Vector3};
 
 pub(super) fn ur5() -> Arm {

@@ -24,7 +24,8 @@ pub struct Group {
 
 /// The smallest and the largest coordinates of all corners that a triangle uses.
 pub fn bounds(groups: &[Group]) -> Option<[Corner; 2]> {
-    let corners = groups.iter().flat_map(|group| group.triangles.iter().flatten().map(|i| group.points[*i as usize]));
+    let corners =
+        groups.iter().flat_map(|group| group.triangles.iter().flatten().map(move |i| group.points[*i as usize]));
     corners.fold(None, |bounds: Option<[Corner; 2]>, point| {
         let [low, high] = bounds.unwrap_or([point; 2]);
         Some([low.inf(&point), high.sup(&point)])

@@ -57,8 +57,9 @@ pub enum Fault {
 /// Finds the closed surfaces. Every group on its own when all are closed, so that parts that touch stay apart; all
 /// groups together otherwise (a surface may be split into groups by material).
 pub fn components(groups: &[Component]) -> Result<Topology, Fault> {
-    let all =
-        bounds_of(groups.iter().flat_map(|group| group.triangles.iter().flatten().map(|i| group.points[*i as usize])));
+    let all = bounds_of(
+        groups.iter().flat_map(|group| group.triangles.iter().flatten().map(move |i| group.points[*i as usize])),
+    );
     let extent = all.map_or(0.0, |bounds| bounds.size().max());
     let apart: Option<Vec<Closed>> = groups.iter().map(|group| closed_by_welding(group, extent).ok()).collect();
     let found = match apart {

@@ -56,8 +56,3 @@ macro_rules! println {
 macro_rules! eprintln {
     ($($words:tt)*) => { $crate::output::print_error(&(::std::format!($($words)*) + "\n")) };
 }
-
-/// Prints to standard error.
-macro_rules! eprint {
-    ($($words:tt)*) => { $crate::output::print_error(&::std::format!($($words)*)) };
-}

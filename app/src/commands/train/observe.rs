@@ -73,7 +73,7 @@ impl Pupil for Observer {
     fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64> {
         let Some(val) = &self.val else { return Ok(0.0) };
         let scores = calibrate::scored(1, &evaluate(val, &self.trainer.update(), &mut |_| ())?);
-        eprint!("{}", calibrate::table("sigma_o", &scores));
+        crate::output::print_error(&calibrate::table("sigma_o", &scores));
         curve.validation(self.trainer.updates(), serde_json::to_value(&scores)?)?;
         Ok(scores.iter().map(|s| 2.0 - s.occupancy_iou - s.semantic_miou).sum::<f64>() / scores.len() as f64)
     }

@@ -157,8 +157,9 @@ fn a_disk_that_filled_up_during_a_run_made_it_hang_for_ever() {
         nudge_ok(&["replay", &out]);
         if let Some(rerun) = venv_tool("rerun") {
             let file = Path::new(&out).join("episode.rrd");
-            let verified = Command::new(rerun).args(["rrd", "verify"]).arg(file).output().expect("rerun");
-            assert!(verified.status.success(), "{share}: {}", text(&verified.stderr));
+            // It has no index, as after a kill, and is read all the same.
+            let counted = Command::new(rerun).args(["rrd", "stats"]).arg(file).output().expect("rerun");
+            assert!(counted.status.success(), "{share}: {}", text(&counted.stderr));
         }
     }
 }

@@ -11,7 +11,7 @@ mod bench;
 mod calibrate;
 mod data;
 mod mesh;
-#[cfg(feature = "workbench")]
+#[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod open;
 mod regress;
 mod replay;
@@ -19,7 +19,7 @@ mod report;
 mod robot;
 mod run;
 mod scene;
-#[cfg(feature = "workbench")]
+#[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod shot;
 mod train;
 mod views;
@@ -35,10 +35,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Open the workbench, with a scene, an episode or a recording (the same as no command)
-    #[cfg(feature = "workbench")]
     Open(open::Args),
     /// Render the workbench's window to a picture, without a display
-    #[cfg(feature = "workbench")]
     Shot(shot::Args),
     /// Map a scene with a policy and write the episode
     Run(run::Args),
@@ -72,9 +70,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         #[cfg(feature = "workbench")]
         None => open::run(&open::Args::default()),
-        #[cfg(feature = "workbench")]
         Some(Command::Open(args)) => open::run(&args),
-        #[cfg(feature = "workbench")]
         Some(Command::Shot(args)) => shot::run(&args),
         // Clap has shown the help already.
         #[cfg(not(feature = "workbench"))]
@@ -132,8 +128,9 @@ impl DeviceArgs {
 /// What beliefs are updated by, and what is weighed how.
 #[derive(clap::Args, Debug)]
 struct PlanningArgs {
-    /// How beliefs are updated: cnabu or classical (default: what a policy is published with)
-    #[arg(long)]
+    /// How beliefs are updated: cnabu (the networks) or classical (counting of rays) [default: cnabu; the policy random is
+    /// defined on the classical one]
+    #[arg(long, value_name = "cnabu|classical")]
     belief: Option<String>,
     #[command(flatten)]
     device: DeviceArgs,
@@ -147,7 +144,7 @@ struct PlanningArgs {
 /// What to say when networks are asked for in a build without them.
 #[cfg(not(feature = "cnabu"))]
 fn no_networks() -> nudge_core::Error {
-    nudge_core::Error::Usage("this build has no networks; build it with --features cnabu (make cnabu)".to_owned())
+    nudge_core::Error::Usage(crate::driver::WITHOUT_NETWORKS.to_owned())
 }
 
 /// Tells of something on standard error that does not stop the work.

@@ -231,7 +231,7 @@ impl Golden {
         }
         let mut policies = Vec::new();
         for policy in &self.policies {
-            let (update, _) = belief_update(Some(&self.belief), *policy)?;
+            let update = belief_update(Some(&self.belief), *policy)?;
             policies.push(PolicyPlan { policy: *policy, belief: update.name().to_owned() });
         }
         Ok(Plan {

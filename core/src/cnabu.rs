@@ -55,7 +55,7 @@ use crate::belief::BeliefUpdate;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// File name of sigma_m's weights; without it pushes are predicted classically.
+/// File name of sigma_m's weights; its card is beside it, with `.toml`.
 pub const PUSH_WEIGHTS: &str = "sigma_m.safetensors";
 /// Whether this build can run the networks.
 pub const AVAILABLE: bool = cfg!(feature = "cnabu");
@@ -146,11 +146,29 @@ pub fn load(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
     Ok(Arc::new(Cnabu::load(directory)?))
 }
 
+/// sigma_o alone with its weights in `directory`, to score observations.
+///
+/// # Errors
+/// As [`load`].
+#[cfg(feature = "cnabu")]
+pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    Ok(Arc::new(Cnabu::load_file(&directory.join(OBSERVE_WEIGHTS))?))
+}
+
+/// sigma_o alone: not in this build.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "cnabu"))]
+pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    load(directory)
+}
+
 /// The networks with the weights in `directory`: not in this build.
 ///
 /// # Errors
 /// Always.
 #[cfg(not(feature = "cnabu"))]
 pub fn load(_directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
-    Err(crate::Error::Usage("this build has no networks; build it with --features cnabu (make cnabu)".to_owned()))
+    Err(crate::Error::Usage("this program was built without networks".to_owned()))
 }

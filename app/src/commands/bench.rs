@@ -12,7 +12,6 @@ use nudge_core::belief::{CLASSICAL, CNABU};
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
 use nudge_core::shard::Shard;
-use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -161,24 +160,11 @@ fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
             }
         }
     }
-    let mut notes: BTreeMap<String, Vec<&str>> = BTreeMap::new();
-    let mut policies = Vec::new();
-    for policy in kinds {
-        let (update, note) = belief_update(args.planning.belief.as_deref(), policy)?;
-        if let Some(note) = note {
-            // The same words for every policy are said once.
-            notes.entry(note.replace(policy.name(), "POLICY")).or_default().push(policy.name());
-        }
-        policies.push(PolicyPlan { policy, belief: update.name().to_owned() });
-    }
-    for (note, names) in notes {
-        warn(
-            &note
-                .replace("POLICY", &names.join(", "))
-                .replace(" runs on ", if names.len() > 1 { " run on " } else { " runs on " }),
-        );
-    }
-    Ok(policies)
+    let plan_of = |policy| {
+        let update = belief_update(args.planning.belief.as_deref(), policy)?;
+        Ok(PolicyPlan { policy, belief: update.name().to_owned() })
+    };
+    kinds.into_iter().map(plan_of).collect()
 }
 
 fn results(directory: &BenchDir, plan: &Plan, episodes: &[EpisodeId]) -> nudge_core::Result<Vec<EpisodeResult>> {

@@ -87,7 +87,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             CNABU => {
                 let directory = args.models.clone().or_else(cnabu::models_dir);
                 let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
-                cnabu::load(&directory.ok_or_else(missing)?)?
+                let load = if pushes.is_some() { cnabu::load } else { cnabu::load_observation };
+                load(&directory.ok_or_else(missing)?)?
             }
             other => anyhow::bail!("unknown belief \"{other}\"; there are cnabu, classical"),
         };

@@ -24,7 +24,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     args.device.choose()?;
     let directory = EpisodeDir::open(&args.episode)?;
     let record = directory.record()?;
-    let (update, _) = belief_update(Some(&record.config.belief), record.config.policy)?;
+    let update = belief_update(Some(&record.config.belief), record.config.policy)?;
     let bar = ProgressBar::new(record.steps.len() as u64);
     let report =
         replay(&directory, Arc::new(Catalog::standard()), update, &mut |done, _| bar.set_position(done as u64))?;

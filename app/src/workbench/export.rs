@@ -165,5 +165,6 @@ fn summary(session: &Session, record: &EpisodeRecord) -> Result<picture::RgbImag
         catalog: &session.setup.catalog,
         start: &session.moment(0).bodies,
         moments: &columns,
+        beside: None,
     })
 }

@@ -282,7 +282,7 @@ fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Momen
 }
 
 fn update_named(name: &str, config: &EpisodeConfig) -> Result<Arc<dyn BeliefUpdate>> {
-    Ok(crate::driver::belief_update(Some(name), config.policy)?.0)
+    crate::driver::belief_update(Some(name), config.policy)
 }
 
 fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Result<(Track, Opened)> {

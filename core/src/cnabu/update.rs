@@ -1,7 +1,7 @@
 //! The networks as a belief update.
 //!
-//! Observations go through sigma_o. Pushes go through sigma_m where its weights are there; where they are not, the
-//! classical rule predicts them, on the belief that sigma_o made.
+//! Observations go through sigma_o, pushes through sigma_m. A [`Cnabu`] of sigma_o alone is for training and for scoring
+//! observations; asked for a push, it predicts by the classical rule.
 
 use super::layout::{LABELS, Layout, Mirror, OCCUPANCY, SEMANTICS};
 use super::observe_net::{Evidence, ObserveNet};
@@ -46,11 +46,9 @@ impl Cnabu {
     /// not set, a CUDA device if libtorch has one.
     ///
     /// # Errors
-    /// For weights that are missing (those of sigma_m may), damaged, not finite, or of another grid, class list or version.
+    /// For weights that are missing, damaged, not finite, or of another grid, class list or version.
     pub fn load(directory: &Path) -> Result<Self> {
-        let update = Self::load_file(&directory.join(OBSERVE_WEIGHTS))?;
-        let push = directory.join(PUSH_WEIGHTS);
-        if push.is_file() { update.with_push_file(&push) } else { Ok(update) }
+        Self::load_file(&directory.join(OBSERVE_WEIGHTS))?.with_push_file(&directory.join(PUSH_WEIGHTS))
     }
 
     /// Loads sigma_o from its file.
@@ -58,9 +56,7 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn load_file(path: &Path) -> Result<Self> {
-        if !path.is_file() {
-            return Err(Error::input(path, "", "there are no weights here (nudge train observe makes them)"));
-        }
+        is_there(path, "observe")?;
         let (net, store, card) = load_network::<ObserveNet>(path, super::chosen_device()?)?;
         Ok(Self::of(net, store, card))
     }
@@ -70,6 +66,7 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn with_push_file(self, path: &Path) -> Result<Self> {
+        is_there(path, "push")?;
         let (net, store, card) = load_network::<PushNet>(path, self.device())?;
         Ok(self.with_push(net, store, card.change_temperature.unwrap_or(1.0)))
     }
@@ -131,6 +128,12 @@ impl Cnabu {
             |planes: &[f32], channels| Tensor::from_slice(planes).reshape(layout.shape(channels)).to_device(device);
         Evidence { occupancy: tensor(&occupancy, 2 * OCCUPANCY), semantics: tensor(&semantics, SEMANTICS) }
     }
+}
+
+/// Refuses a file of weights that is missing, and names the command that makes it.
+fn is_there(path: &Path, network: &str) -> Result<()> {
+    let missing = || Error::input(path, "", format!("no weights are here (`nudge train {network}` makes them)"));
+    path.is_file().then_some(()).ok_or_else(missing)
 }
 
 /// The belief of planes of evidence's logarithms.

@@ -116,6 +116,13 @@ pub fn set_threads(threads: usize) {
     tch::set_num_threads(threads.clamp(1, 1024) as i32);
 }
 
+/// Has libtorch compute on the thread that asks, as rayon's threads share the work; once, before weights are loaded.
+/// (Training has libtorch's own threads: [`set_threads`].)
+pub fn compute_beside_rayon() {
+    #[cfg(feature = "cnabu")]
+    set_threads(1);
+}
+
 /// The device of a name: `cpu`, `cuda`, or `auto` for CUDA when libtorch has it.
 ///
 /// # Errors
@@ -152,7 +159,7 @@ pub fn load(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
 /// As [`load`].
 #[cfg(feature = "cnabu")]
 pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
-    Ok(Arc::new(Cnabu::load_file(&directory.join(OBSERVE_WEIGHTS))?))
+    Ok(Arc::new(Cnabu::load_observation(directory)?))
 }
 
 /// sigma_o alone: not in this build.

@@ -87,6 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             CNABU => {
                 let directory = args.models.clone().or_else(cnabu::models_dir);
                 let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
+                cnabu::compute_beside_rayon();
                 let load = if pushes.is_some() { cnabu::load } else { cnabu::load_observation };
                 load(&directory.ok_or_else(missing)?)?
             }

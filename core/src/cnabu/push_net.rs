@@ -43,6 +43,11 @@ pub struct PriorParts {
 }
 
 impl PriorParts {
+    /// The same numbers, not copied, for another thread.
+    pub(super) fn shared(&self) -> Self {
+        Self { stem: self.stem.shallow_clone(), labels: self.labels.shallow_clone() }
+    }
+
     /// Cut to windows, one above the other.
     pub(crate) fn windows(&self, xs: &[Range<usize>]) -> Self {
         Self { stem: windows(&self.stem, xs), labels: windows(&self.labels, xs) }

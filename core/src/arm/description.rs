@@ -1,8 +1,8 @@
 //! What a URDF file says, before it is checked: links with their collision shapes, and joints.
 //!
-//! Only what an arm needs is read: `link` (its `collision`s), `joint` with `origin`, `axis`, `limit` and `mimic`. The XML
-//! is read by `roxmltree`, which keeps the place of every element, so that a fault is told with its line. (The crate
-//! `urdf-rs` reads the same format, but forgets the places.)
+//! Only what an arm needs is read: `link` (its `collision`s), `joint` with `origin`, `axis`, `limit` and `mimic`. The
+//! XML is read by `roxmltree`, which keeps the place of every element, so that every error names its line. (The crate
+//! `urdf-rs` reads the same format but does not keep line numbers.)
 
 use crate::scene::robot::xml;
 use crate::{Error, Result};
@@ -12,7 +12,7 @@ use std::path::Path;
 
 use super::Frame;
 
-/// Numbers beyond this are no lengths of an arm, metres.
+/// Larger numbers are refused as lengths of an arm, metres.
 pub(super) const FAR_M: f64 = 20.0;
 
 /// A robot as its file describes it.

@@ -7,7 +7,7 @@
 use crate::grid::{Grid, VoxelSet};
 use rayon::prelude::*;
 
-/// Distances beyond this many voxels are all the same.
+/// Distances above this many voxels are not distinguished.
 const CAP: usize = 24;
 const FAR: i16 = (CAP * CAP) as i16;
 

@@ -1,4 +1,4 @@
-//! How well a belief update does on held-out scenes, against the number of views.
+//! Scores of a belief update on held-out scenes, against the number of views.
 
 use super::{Dataset, MapSample, PushSample, PushedSample, VIEWS, VIEWS_AFTER, ViewSample};
 use crate::Result;

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// How far the making is.
+/// Progress of making samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Samples of this process that are on disk or made.
@@ -19,8 +19,8 @@ pub struct Progress {
     pub of: usize,
 }
 
-/// Makes the samples of `card` that are not there yet in `directory`, as far as their files are among `mine`. A directory that was
-/// begun is gone on with; a larger count extends it.
+/// Makes the samples of `card` that are not there yet in `directory`, as far as their files are among `mine`. An
+/// unfinished directory is continued; a larger count extends it.
 ///
 /// `progress` is told after every sample, from any thread.
 ///

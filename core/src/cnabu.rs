@@ -79,7 +79,7 @@ pub fn models_dir() -> Option<PathBuf> {
     beside.chain(rest).find(|directory| directory.join(OBSERVE_WEIGHTS).is_file())
 }
 
-/// What [`choose_device`] was told.
+/// The device that [`choose_device`] chose.
 static CHOSEN: OnceLock<String> = OnceLock::new();
 
 /// Chooses the device that weights are loaded onto, before [`DEVICE_ENV`]; the first choice holds.

@@ -67,7 +67,7 @@ impl DistanceField {
         &self.grid
     }
 
-    /// The largest distance that is told apart, metres.
+    /// The largest distance that is distinguished, metres.
     pub fn cap_m(&self) -> f64 {
         self.metres[CAP * CAP]
     }

@@ -147,7 +147,7 @@ impl EpisodeDir {
         Ok(directory)
     }
 
-    /// Keeps beliefs with the given precision; float16 unless told.
+    /// Keeps beliefs with the given precision; the default is float16.
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;
         self
@@ -172,7 +172,7 @@ impl EpisodeDir {
         Ok(directory)
     }
 
-    /// Opens an episode to go on writing: no other run may be writing it. Files beyond the last step told of in
+    /// Opens an episode to continue writing: no other run may be writing it. Files beyond the last step in
     /// `episode.json` are removed.
     pub(super) fn open_to_write(path: &Path) -> Result<Self> {
         let mut directory = Self::open(path)?;

@@ -22,10 +22,10 @@ pub struct Progress {
 /// Makes the samples of `card` that are not there yet in `directory`, as far as their files are among `mine`. An
 /// unfinished directory is continued; a larger count extends it.
 ///
-/// `progress` is told after every sample, from any thread.
+/// `progress` is called after every sample, from any thread.
 ///
 /// # Errors
-/// For a directory that was begun with other settings, and when something cannot be simulated or written.
+/// For a directory that was started with other settings, and when something cannot be simulated or written.
 pub fn make<S: Sample>(
     card: &Card,
     recipe: &Recipe,

@@ -1,8 +1,8 @@
 //! Benches: every policy on every scene of some sets, a few seeds each.
 //!
-//! A [`Plan`] says which episodes a bench consists of; [`BenchDir`] keeps one small file per finished episode, so that
-//! a kill loses no more than the episodes that were running; [`run`] runs the missing episodes, several at once;
-//! [`merge()`] joins the directories of shards. What an episode leaves is an [`EpisodeResult`] that is the same byte
+//! A [`Plan`] says which episodes a bench consists of; [`BenchDir`] keeps one small file per finished episode, so that a
+//! kill loses no more than the episodes that were running; [`run`] works through what is missing, several episodes at
+//! once; [`merge()`] joins the directories of shards. What an episode leaves is an [`EpisodeResult`] that is the same byte
 //! for byte whenever and wherever it ran, and its seconds in a file of their own.
 
 mod merge;

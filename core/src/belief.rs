@@ -239,7 +239,7 @@ pub trait BeliefUpdate: Send + Sync {
         false
     }
 
-    /// The belief after an observation: `lambda' = sigma_o(lambda, o)`. Episodes call [`look`], which calls this.
+    /// The belief after an observation: `lambda' = sigma_o(lambda, o)`. Episodes go through [`look`].
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief;
 
     /// The beliefs that pushes are predicted to leave: `lambda' = sigma_m(lambda, push)`, one prediction per push.

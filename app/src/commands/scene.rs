@@ -76,7 +76,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-/// A progress bar on standard error, if that is a terminal and there is more than one item.
+/// A bar on standard error, when that is a terminal and there is more than one thing to wait for.
 fn progress(count: usize, what: &str) -> ProgressBar {
     if count < 2 {
         return ProgressBar::hidden();

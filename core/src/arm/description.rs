@@ -1,8 +1,8 @@
 //! What a URDF file says, before it is checked: links with their collision shapes, and joints.
 //!
-//! Only what an arm needs is read: `link` (its `collision`s), `joint` with `origin`, `axis`, `limit` and `mimic`. The
-//! XML is read by `roxmltree`, which keeps the place of every element, so that every error names its line. (The crate
-//! `urdf-rs` reads the same format but does not keep line numbers.)
+//! Only what an arm needs is read: `link` (its `collision`s), `joint` with `origin`, `axis`, `limit` and `mimic`. The XML
+//! is read by `roxmltree`, which keeps the place of every element, so that a fault is told with its line. (The crate
+//! `urdf-rs` reads the same format, but forgets the places.)
 
 use crate::scene::robot::xml;
 use crate::{Error, Result};

@@ -32,11 +32,11 @@ pub fn resume(
     Ok((directory, episode))
 }
 
-/// Opens the episode in `path` to look at it: nothing is locked or written. Where the repeated actions do not lead
-/// where the log says (it was written by another version, or on another machine), step, belief and truth from the files
-/// replace the repeated ones, and the first such place is returned beside the episode. Bodies and images remain the
-/// repeated ones. Without an update everything comes from the files, nothing is compared, pushes have no predictions,
-/// and after a push no voxel counts as seen.
+/// Opens the episode in `path` to look at it: nothing is locked or written. Where the repeated actions do not lead where
+/// the log says (it was written by another version, or on another machine), the filed step, belief and truth stand in
+/// place of the repeated ones, and the first such place is told beside the episode. Bodies and images remain the
+/// repeated ones. Without an update everything is as it is filed, nothing is compared, pushes have no predictions, and
+/// after a push no voxel counts as seen.
 ///
 /// # Errors
 /// Those of [`resume`] but for [`Error::Check`], and [`Error::Usage`] for an action of the log that cannot be repeated.

@@ -79,7 +79,7 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
     Weighed { candidates, best, motion }
 }
 
-/// What a push is worth, with everything that is computed once for all candidates.
+/// What makes a push worth it, and what is computed once for all candidates.
 enum Worth {
     /// The best of some single views afterwards.
     View(RayGains, Vec<ViewId>),

@@ -1,9 +1,9 @@
 //! The regression gate: a small fixed bench whose scores must stay what they were.
 //!
-//! A golden file names scenes, policies and a budget, and holds for every policy what its episodes scored, with a
-//! tolerance for each score. A change that is meant to alter scores shows how they differ, and [`Golden::bless`]
-//! accepts the new ones. Tolerances are measured: [`SPREADS`] times the standard deviation of the scores between seeds,
-//! that is, how far they move by chance alone, and never below a floor for rounding on other machines.
+//! A golden file names scenes, policies and a budget, and holds for every policy what its episodes scored, with a tolerance
+//! for each score. A change that means to alter scores shows how, and [`Golden::bless`] takes the new ones over. Tolerances
+//! are measured, not chosen: [`SPREADS`] times the spread of the scores between seeds, which is how far they move when
+//! nothing but chance changes, and never below a floor for what another machine's rounding can do.
 
 use crate::bench::{
     BenchDir, EpisodeResult, Event, FORMAT as BENCH_FORMAT, Plan, PolicyPlan, ScenePlan, SetPlan, Workers, run,

@@ -1,4 +1,4 @@
-//! The losses of a training run: printed on the terminal and written to `FILE.jsonl`.
+//! The losses of a training run on their way to the terminal and to `FILE.jsonl`.
 
 use crate::commands::warn;
 use crate::record::training::CurveRecorder;
@@ -21,8 +21,8 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    /// The curve of the run named `out`, which has `updates` updates; a resumed run is continued. With `follow` it is
-    /// recorded too: into `FILE.rrd`, or `FILE-UPDATES.rrd` when it is resumed.
+    /// The curve of the run named `out`, which has `updates` updates; one that is resumed is gone on with. With `follow`
+    /// it is recorded too: into `FILE.rrd`, or `FILE-UPDATES.rrd` when it is resumed.
     pub(super) fn open(out: &Path, resume: bool, follow: bool, updates: u64) -> anyhow::Result<Self> {
         let name = out.file_name().unwrap_or_default().to_string_lossy();
         let path = out.with_file_name(format!("{name}.jsonl"));
@@ -48,7 +48,7 @@ impl Curve {
         }
     }
 
-    /// Reports the means since the last report.
+    /// Tells the means since the last report.
     pub(super) fn report(&mut self, updates: u64) -> anyhow::Result<()> {
         if self.sums.is_empty() {
             return Ok(());
@@ -89,8 +89,7 @@ impl Curve {
     }
 }
 
-/// The numbers of a document with their places, `validation/3/occupancy_iou`; rows with `views` are named by that
-/// number.
+/// The numbers of a document with their places, `validation/3/occupancy_iou`; rows that tell their `views` go by them.
 fn leaves(value: &Value, place: &str) -> Vec<(String, f64)> {
     match value {
         Value::Number(number) => number.as_f64().map(|number| (place.to_owned(), number)).into_iter().collect(),

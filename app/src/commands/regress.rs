@@ -1,9 +1,9 @@
 //! `nudge regress`: a small fixed bench against its golden scores.
 
 use super::bench::workers;
+use super::progress::Progress;
 use super::{print, to_json};
 use crate::regress::{Compared, Golden};
-use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use std::path::PathBuf;
 
@@ -29,11 +29,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let golden = Golden::read(&args.golden)?;
     let episodes = if args.bless { golden.episodes_to_bless() } else { golden.episodes() };
     let workers = workers(args.jobs, episodes);
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {elapsed}").expect("a constant template");
-    let bar = ProgressBar::new(episodes as u64).with_style(style);
+    let progress = Progress::new("regress", episodes);
     if args.bless {
-        let blessed = golden.bless(&args.golden, workers, &mut || bar.inc(1))?;
-        bar.finish_and_clear();
+        let blessed = golden.bless(&args.golden, workers, &mut || progress.inc())?;
+        progress.finish();
         let mut text = String::new();
         for score in blessed.scores() {
             let name = format!("{} {}", score.policy, score.name);
@@ -51,8 +50,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         blessed.write(&args.golden)?;
         return print(&format!("written to {}\n", args.golden.display()));
     }
-    let compared = golden.compare(&args.golden, workers, &mut || bar.inc(1))?;
-    bar.finish_and_clear();
+    let compared = golden.compare(&args.golden, workers, &mut || progress.inc())?;
+    progress.finish();
     if args.json {
         print(&to_json(&serde_json::json!({ "scores": compared }))?)?;
     } else {

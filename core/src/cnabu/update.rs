@@ -9,8 +9,9 @@ use super::predict::predict;
 use super::push_net::PushNet;
 use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
-use crate::belief::{Belief, BeliefUpdate, Classical, PushPrediction, SweptPush};
+use crate::belief::{Belief, BeliefUpdate, Classical, NetworksUsed, PushPrediction, SweptPush, Weights};
 use crate::camera::MapObservation;
+use crate::files::sha256_of_file;
 use crate::grid::Grid;
 use crate::{Error, Result};
 use std::path::Path;
@@ -24,6 +25,8 @@ pub struct Cnabu {
     // libtorch's tensors may be sent to another thread but not be used by two at once.
     networks: Mutex<Networks>,
     card: Card,
+    /// The files that they were read from.
+    weights: Weights,
 }
 
 #[derive(Debug)]
@@ -58,7 +61,8 @@ impl Cnabu {
     pub fn load_file(path: &Path) -> Result<Self> {
         is_there(path, "observe")?;
         let (net, store, card) = load_network::<ObserveNet>(path, super::chosen_device()?)?;
-        Ok(Self::of(net, store, card))
+        let weights = Weights { sigma_o: Some(sha256_of_file(path)?), ..Weights::default() };
+        Ok(Self { weights, ..Self::of(net, store, card) })
     }
 
     /// The same with sigma_m from its file.
@@ -68,16 +72,20 @@ impl Cnabu {
     pub fn with_push_file(self, path: &Path) -> Result<Self> {
         is_there(path, "push")?;
         let (net, store, card) = load_network::<PushNet>(path, self.device())?;
-        Ok(self.with_push(net, store, card.change_temperature.unwrap_or(1.0)))
+        let mut update = self.with_push(net, store, card.change_temperature.unwrap_or(1.0));
+        update.weights.sigma_m = Some(sha256_of_file(path)?);
+        Ok(update)
     }
 
     /// A belief update of a sigma_o at hand.
     pub fn of(net: ObserveNet, store: VarStore, card: Card) -> Self {
-        Self { networks: Mutex::new(Networks { observe: net, push: None, stores: vec![store] }), card }
+        let networks = Networks { observe: net, push: None, stores: vec![store] };
+        Self { networks: Mutex::new(networks), card, weights: Weights::default() }
     }
 
     /// The same with a sigma_m at hand, whose log-odds of change are divided by `temperature`.
-    pub fn with_push(self, net: PushNet, store: VarStore, temperature: f32) -> Self {
+    pub fn with_push(mut self, net: PushNet, store: VarStore, temperature: f32) -> Self {
+        self.weights = Weights { sigma_m: None, change_temperature: Some(temperature), ..self.weights };
         {
             let mut networks = self.networks();
             networks.push = Some((net, temperature));
@@ -168,6 +176,15 @@ impl BeliefUpdate for Cnabu {
     /// sigma_o learned to take in ten looks; by forty its map of what is seen has worn (RESULTS.md).
     fn wears(&self) -> bool {
         true
+    }
+
+    fn networks_used(&self) -> Option<NetworksUsed> {
+        let device = if self.device().is_cuda() { "cuda" } else { "cpu" };
+        Some(NetworksUsed {
+            weights: self.weights.clone(),
+            libtorch: env!("NUDGE_LIBTORCH").to_owned(),
+            device: device.to_owned(),
+        })
     }
 
     /// A grid of other voxels than the networks' ([`BeliefUpdate::check_grid`] refuses it) is updated classically.

@@ -80,10 +80,15 @@ impl BenchDir {
             if directory.missing(&before)?.len() < before.episodes().len() {
                 let (sets, broken) = (plan.sets.clone(), plan.broken.clone());
                 filed = Plan { sets, broken, ..before };
-                filed.join(plan, mixing).map_err(|words| {
+                let mut joined = filed.clone();
+                joined.join(plan, mixing).map_err(|words| {
                     let message = format!("holds results that were made otherwise: {words}; --allow-mixed goes on");
                     Error::input(path, "", message)
                 })?;
+                // Who finds nothing left to do makes nothing.
+                if !directory.missing(&filed)?.is_empty() {
+                    filed = joined;
+                }
             }
         }
         directory.write(Path::new(DOCUMENT), &filed)?;

@@ -62,12 +62,13 @@ mod tests {
         let words = told(&made_by);
         assert!(words.contains(&format!("commit {} and changes", "a".repeat(40))), "{words}");
         assert!(words.contains("threads: 4") && words.contains("certain 0.85") && !words.contains("sigma"), "{words}");
+        let (one, other) = ("b".repeat(64), "c".repeat(64));
         made_by.weights =
-            Some(Weights { sigma_o: Some("b".repeat(64)), sigma_m: Some("c".repeat(64)), change_temperature: None });
+            Some(Weights { sigma_o: Some(one.clone()), sigma_m: Some(other.clone()), change_temperature: None });
         (made_by.libtorch, made_by.device) = (Some("2.13.0".to_owned()), Some("cpu".to_owned()));
         made_by.commit = UNKNOWN.to_owned();
         let words = told(&made_by);
-        for part in [&"b".repeat(64), &"c".repeat(64), "libtorch: 2.13.0 on cpu", "commit unknown"] {
+        for part in [&*one, &*other, "libtorch: 2.13.0 on cpu", "commit unknown"] {
             assert_eq!(words.matches(part).count(), 1, "{part}: {words}");
         }
     }

@@ -39,10 +39,10 @@ impl Plan {
     /// Whether results with a version and a fingerprint are of one of its makers. Results and benches of programs that did
     /// not tell pass.
     pub(super) fn knows(&self, version: &str, fingerprint: Option<&str>) -> bool {
-        let versions = self.makers().flatten().map(|maker| maker.version.as_str());
+        let mut versions = self.makers().flatten().map(|maker| maker.version.as_str());
         let mut fingerprints = self.makers().flatten().map(|maker| maker.fingerprint.as_str()).peekable();
         let is_told = fingerprints.peek().is_some();
-        let has_version = self.version == version || versions.into_iter().any(|known| known == version);
+        let has_version = self.version == version || versions.any(|known| known == version);
         has_version && fingerprint.is_none_or(|fingerprint| !is_told || fingerprints.any(|known| known == fingerprint))
     }
 

@@ -64,24 +64,16 @@ pub fn head(results: &Results) -> Vec<Paragraph> {
 /// What made the numbers.
 pub fn made_by(plan: &Plan) -> Table {
     let mut table = Table::new("What made these numbers.", &["made by", ""]);
+    let mut tell = |name: &str, value: String| table.rows.push(vec![Cell::new(name), Cell::new(value)]);
     match &plan.made_by {
-        Some(made_by) => table.rows.extend(
-            facts(made_by)
-                .into_iter()
-                .map(|(name, value)| [name.to_owned(), value])
-                .map(|row| row.map(Cell::new).to_vec()),
-        ),
-        None => table
-            .rows
-            .push(vec![Cell::new("program"), Cell::new(format!("nudge {}, which told no more", plan.version))]),
+        Some(made_by) => facts(made_by).into_iter().for_each(|(name, value)| tell(name, value)),
+        None => tell("program", format!("nudge {}, which told no more", plan.version)),
     }
     for also in &plan.also_made_by {
-        let name = if also.mixed { "mixed with" } else { "and" };
-        table.rows.push(vec![Cell::new(name), Cell::new(also.differs.join("; "))]);
+        tell(if also.mixed { "mixed with" } else { "and" }, also.differs.join("; "));
     }
-    let Plan { views, format, .. } = plan;
-    table.rows.push(vec![Cell::new("views"), Cell::new(views)]);
-    table.rows.push(vec![Cell::new("format"), Cell::new(format)]);
+    tell("views", plan.views.clone());
+    tell("format", plan.format.to_string());
     table
 }
 

@@ -130,14 +130,12 @@ impl SessionArgs {
 
     /// Time to the end that was asked for, as far as one was: `--patience` may stop it sooner.
     fn left(&self, begun_at: u64, updates: u64, elapsed: Duration) -> Option<Duration> {
-        let made = updates.saturating_sub(begun_at);
-        let by_updates = self.updates.filter(|_| made > 0).map(|end| {
-            let to_come = end.saturating_sub(updates);
-            elapsed.mul_f64(to_come as f64 / made as f64)
-        });
-        let by_minutes = self.minutes.filter(|minutes| minutes.is_finite() && *minutes >= 0.0);
-        let by_minutes = by_minutes.map(|minutes| Duration::from_secs_f64(60.0 * minutes).saturating_sub(elapsed));
-        by_updates.into_iter().chain(by_minutes).min()
+        let (made, elapsed) = (updates.saturating_sub(begun_at) as f64, elapsed.as_secs_f64());
+        let by_updates = self.updates.map(|end| elapsed * end.saturating_sub(updates) as f64 / made);
+        let by_minutes = self.minutes.map(|minutes| (60.0 * minutes - elapsed).max(0.0));
+        // What is no time, or longer than can be told, is left out.
+        let times = by_updates.into_iter().chain(by_minutes).filter_map(|time| Duration::try_from_secs_f64(time).ok());
+        times.min()
     }
 
     fn is_over(&self, updates: u64, started: Instant) -> bool {

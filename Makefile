@@ -54,21 +54,29 @@ install: workbench-build
 uninstall:
 	scripts/install.sh --uninstall "$(or $(PREFIX),$(HOME)/.local)"
 
-# The recipes of the shipped weights; models/*.toml tell them too, and a test compares.
+# The recipes of the shipped weights, as their cards tell them (a test compares). Each command goes on where it was stopped.
+# What comes out lies in out/models: NUDGE_MODELS=out/models runs on it.
+resume-or = $$([ -e $(1).safetensors ] && echo --resume || echo $(2))
 train: headless
 	$(NUDGE) data maps --seed 2 --count 50 --noise 0 --out $(DATA)/maps/val
 	$(NUDGE) data maps --seed 3 --count 300 --noise 0 --out $(DATA)/maps/test
 	$(NUDGE) data maps --seed 1 --count 3000 --noise 0.25 --out $(DATA)/maps/train_before
 	$(NUDGE) data maps --seed 5 --count 7000 --noise 0.25 --fill 0.3-0.5 --stretch 0.8-1.2 --stretch-share 0.3 --out $(DATA)/maps/train
-	scripts/train.sh $(NUDGE) observe $(DATA)
-	$(NUDGE) train export observe $(DATA)/sigma_o --data $(DATA)/maps/train --test $(DATA)/maps/test --half --out out/models
+	$(NUDGE) train observe --data $(DATA)/maps/train_before --val $(DATA)/maps/val --out $(DATA)/sigma_o_before \
+		--width 32 --batch 4 --max-views 20 --move-share 0 --updates 13015 --seed 0 $(call resume-or,$(DATA)/sigma_o_before,)
+	$(NUDGE) train export observe $(DATA)/sigma_o_before --data $(DATA)/maps/train_before --test $(DATA)/maps/test --scenes 50 --out $(DATA)/before
+	$(NUDGE) train observe --data $(DATA)/maps/train --val $(DATA)/maps/val --out $(DATA)/sigma_o \
+		--width 32 --batch 4 --max-views 20 --move-share 0 --learning-rate 0.0007 --updates 33032 --seed 0 \
+		$(call resume-or,$(DATA)/sigma_o,--from $(DATA)/before/sigma_o.safetensors)
+	$(NUDGE) train export observe $(DATA)/sigma_o --data $(DATA)/maps/train --test $(DATA)/maps/test --out out/models
 
 train-push: headless
 	$(NUDGE) data pushes --seed 2 --count 60 --noise 0 --out $(DATA)/pushes/val
 	$(NUDGE) data pushes --seed 3 --count 300 --noise 0 --out $(DATA)/pushes/test
 	$(NUDGE) data pushes --seed 1 --count 3300 --noise 0.25 --out $(DATA)/pushes/train
-	scripts/train.sh $(NUDGE) push $(DATA)
-	$(NUDGE) train export push $(DATA)/sigma_m --data $(DATA)/pushes/train --val $(DATA)/pushes/val --test $(DATA)/pushes/test --half --out out/models
+	$(NUDGE) train push --data $(DATA)/pushes/train --val $(DATA)/pushes/val --out $(DATA)/sigma_m \
+		--width 24 --batch 4 --learning-rate 0.001 --updates 8316 --seed 0 $(call resume-or,$(DATA)/sigma_m,)
+	$(NUDGE) train export push $(DATA)/sigma_m --data $(DATA)/pushes/train --val $(DATA)/pushes/val --test $(DATA)/pushes/test --out out/models
 
 test: test-core test-window
 

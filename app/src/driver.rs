@@ -241,6 +241,7 @@ fn networks() -> std::result::Result<Arc<dyn BeliefUpdate>, NoNetworks> {
         return Ok(loaded.clone());
     }
     let directory = cnabu::models_dir().ok_or(NoNetworks::Missing(WITHOUT_WEIGHTS))?;
+    cnabu::compute_beside_rayon();
     let update = cnabu::load(&directory).map_err(NoNetworks::Broken)?;
     Ok(LOADED.get_or_init(|| update).clone())
 }

@@ -3,8 +3,8 @@
 //! Both are residual U-Nets over the floor plan whose channels are the heights; they give evidence, a Beta per voxel and a
 //! Dirichlet per floor cell, and are trained with evidential losses on our own simulated data ([`crate::learn`]).
 //!
-//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has this module's
-//! door only: [`AVAILABLE`] is false, and [`load`] says so.
+//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has only
+//! [`AVAILABLE`], which is false, and [`load`], which returns an error.
 
 #[cfg(feature = "cnabu")]
 mod layout;
@@ -79,7 +79,7 @@ pub fn models_dir() -> Option<PathBuf> {
     beside.chain(rest).find(|directory| directory.join(OBSERVE_WEIGHTS).is_file())
 }
 
-/// What [`choose_device`] was told.
+/// The device that [`choose_device`] chose.
 static CHOSEN: OnceLock<String> = OnceLock::new();
 
 /// Chooses the device that weights are loaded onto, before [`DEVICE_ENV`]; the first choice holds.
@@ -114,6 +114,13 @@ fn chosen_device() -> Result<Device> {
 #[cfg(feature = "cnabu")]
 pub fn set_threads(threads: usize) {
     tch::set_num_threads(threads.clamp(1, 1024) as i32);
+}
+
+/// Has libtorch compute on the thread that asks, as rayon's threads share the work; once, before weights are loaded.
+/// (Training has libtorch's own threads: [`set_threads`].)
+pub fn compute_beside_rayon() {
+    #[cfg(feature = "cnabu")]
+    set_threads(1);
 }
 
 /// The device of a name: `cpu`, `cuda`, or `auto` for CUDA when libtorch has it.
@@ -152,7 +159,7 @@ pub fn load(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
 /// As [`load`].
 #[cfg(feature = "cnabu")]
 pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
-    Ok(Arc::new(Cnabu::load_file(&directory.join(OBSERVE_WEIGHTS))?))
+    Ok(Arc::new(Cnabu::load_observation(directory)?))
 }
 
 /// sigma_o alone: not in this build.

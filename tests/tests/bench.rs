@@ -248,7 +248,7 @@ fn the_gate_holds_what_was_blessed_and_trips_on_what_changed() {
     score["golden"] = Value::from(score["golden"].as_f64().expect("number") + 1.5 * tolerance);
     std::fs::write(&golden, changed.to_string()).expect("write");
     let line = nudge_fails(1, &["regress", "--golden", &golden]);
-    assert!(line.contains("1 of 14") && line.contains(&name), "{line}");
+    assert!(line.contains("1 of 20") && line.contains(&name), "{line}");
     let said = text(&gate(&["--bless"]).stdout);
     assert!(said.contains("was ") && gate(&[]).status.success(), "{said}");
 

@@ -87,6 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             CNABU => {
                 let directory = args.models.clone().or_else(cnabu::models_dir);
                 let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
+                cnabu::compute_beside_rayon();
                 let load = if pushes.is_some() { cnabu::load } else { cnabu::load_observation };
                 load(&directory.ok_or_else(missing)?)?
             }
@@ -153,7 +154,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
 }
 
-/// What held-out pushes gave.
+/// Scores on held-out pushes.
 #[derive(Default)]
 struct Pushed {
     /// By prediction: scores on the floor cells that pushes change.

@@ -13,6 +13,7 @@ mod data;
 mod mesh;
 #[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod open;
+mod progress;
 mod regress;
 mod replay;
 mod report;

@@ -11,6 +11,7 @@ pub mod driver;
 pub mod figure;
 #[cfg(test)]
 mod fixture;
+pub mod made_by;
 pub mod picture;
 pub mod planner_args;
 pub mod record;

@@ -252,6 +252,8 @@ impl Golden {
             sets: vec![SetPlan { name: "regress".to_owned(), scenes }],
             broken: Vec::new(),
             shard: None,
+            made_by: None,
+            also_made_by: Vec::new(),
         })
     }
 }

@@ -20,6 +20,8 @@ mod synthetic;
 pub use directory::{DirectoryState, EpisodeDir, Overwrite};
 pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
-pub use record::{EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds};
+pub use record::{
+    EpisodeConfig, EpisodeRecord, FORMAT, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
+};
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
 pub use resume::{Observer, resume, review};

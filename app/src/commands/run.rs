@@ -2,9 +2,9 @@
 
 mod table;
 
+use super::progress::Progress;
 use crate::driver::{Driver, belief_update, default_out};
 use crate::planner_args;
-use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
 use nudge_core::plan::{Action, PolicyKind};
@@ -68,7 +68,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         table::header(main.episode().record());
         main.episode().record().steps.iter().for_each(|step| table::step(step, args.budget));
     }
-    go_on(&mut main, "", &mut |step| {
+    // It prints a row for every step, the one beside it nothing.
+    go_on(&mut main, Progress::bar("run", args.budget), &mut |step| {
         if !args.json {
             table::step(step, args.budget);
         }
@@ -78,7 +79,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let started = Instant::now();
         let out = beside_of(&out, policy);
         let mut other = begin_with(policy, &out)?;
-        go_on(&mut other, policy.name(), &mut |_| ())?;
+        let (name, budget) = (policy.name(), args.budget);
+        let progress = if args.json { Progress::bar(name, budget) } else { Progress::new(name, budget) };
+        go_on(&mut other, progress, &mut |_| ())?;
         columns.push(Column::of(&other, &out, started)?);
         other.finish()?;
     }
@@ -115,31 +118,30 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
     }
     let logged = EpisodeDir::open(out)?.record()?;
     same_episode(&logged, &scene, &config, out)?;
-    let bar = bar(logged.steps.len(), "repeating");
+    let progress = Progress::new("repeating", logged.steps.len());
     let driver = Driver::resume(out, catalog, update, &mut |episode, _| {
-        bar.set_position(episode.record().steps.len() as u64);
+        progress.at(episode.record().steps.len());
         Ok(())
     })?;
-    bar.finish_and_clear();
+    progress.finish();
     Ok(driver)
 }
 
 /// Does the actions that are left, and shows each.
-fn go_on(driver: &mut Driver, title: &'static str, show: &mut dyn FnMut(&StepRecord)) -> anyhow::Result<()> {
-    let bar = bar(driver.episode().record().config.budget, title);
-    let title = if title.is_empty() { String::new() } else { format!("{title}: ") };
+fn go_on(driver: &mut Driver, progress: Progress, show: &mut dyn FnMut(&StepRecord)) -> anyhow::Result<()> {
+    let progress = progress.with_done(driver.episode().record().steps.len());
     while !driver.episode().is_finished() {
-        bar.set_position(driver.episode().record().steps.len() as u64);
-        bar.set_message(format!("{title}deciding"));
+        progress.doing("deciding");
         let decision = driver.decide();
-        bar.set_message(match decision.action {
-            Action::Look { .. } => format!("{title}looking"),
-            Action::Push(_) => format!("{title}pushing"),
+        progress.doing(match decision.action {
+            Action::Look { .. } => "looking",
+            Action::Push(_) => "pushing",
         });
         let outcome = driver.act(decision)?;
-        bar.suspend(|| show(&outcome.record));
+        progress.suspend(|| show(&outcome.record));
+        progress.at(outcome.record.index);
     }
-    bar.finish_and_clear();
+    progress.finish();
     Ok(())
 }
 
@@ -191,9 +193,4 @@ fn same_episode(
         }
     }
     Ok(())
-}
-
-fn bar(length: usize, message: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {msg} {elapsed}").expect("a valid template");
-    ProgressBar::new(length as u64).with_style(style).with_message(message)
 }

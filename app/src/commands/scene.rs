@@ -1,7 +1,7 @@
 //! `nudge scene`: make, check, generate, rescale and draw scene files.
 
+use super::progress::Progress;
 use super::{print, to_json, warn};
-use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::camera::{ViewArray, hidden_objects};
@@ -76,15 +76,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-/// A bar on standard error, when that is a terminal and there is more than one thing to wait for.
-fn progress(count: usize, what: &str) -> ProgressBar {
-    if count < 2 {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}").expect("a constant template");
-    ProgressBar::new(count as u64).with_style(style).with_message(what.to_owned())
-}
-
 fn new(args: &NewArgs) -> anyhow::Result<()> {
     let catalog = Catalog::standard();
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", args.name)));
@@ -153,7 +144,7 @@ struct Facts {
 fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let catalog = Catalog::standard();
     let views = ViewArray::named(&args.views)?;
-    let bar = progress(args.files.len(), "checking");
+    let bar = Progress::new("check", args.files.len());
     let mut documents = Vec::new();
     let mut last_error: Option<Error> = None;
     for file in &args.files {
@@ -189,9 +180,9 @@ fn check(args: &CheckArgs) -> anyhow::Result<()> {
             }
         }
         documents.push(document);
-        bar.inc(1);
+        bar.inc();
     }
-    bar.finish_and_clear();
+    bar.finish();
     if args.json {
         print(&to_json(&serde_json::json!({ "scenes": documents }))?)?;
     }

@@ -13,8 +13,9 @@ use super::predict::predict;
 use super::push_net::PushNet;
 use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
-use crate::belief::{Belief, BeliefUpdate, Classical, PushPrediction, SweptPush};
+use crate::belief::{Belief, BeliefUpdate, Classical, NetworksUsed, PushPrediction, SweptPush, Weights};
 use crate::camera::MapObservation;
+use crate::files::sha256_of_file;
 use crate::grid::Grid;
 use crate::{Error, Result};
 use std::path::Path;
@@ -27,6 +28,8 @@ use tch::{Device, Kind, Tensor};
 pub struct Cnabu {
     pool: Pool,
     card: Card,
+    /// The files that they were read from.
+    weights: Weights,
 }
 
 /// The same networks several times, one for each thread that may ask at once: libtorch's tensors may be sent to another
@@ -67,7 +70,8 @@ impl Cnabu {
     /// For weights that are missing, damaged, not finite, or of another grid, class list or version.
     pub fn load(directory: &Path) -> Result<Self> {
         let [observe, push] = [OBSERVE_WEIGHTS, PUSH_WEIGHTS].map(|file| directory.join(file));
-        Self::for_all_threads(|| Self::load_file(&observe)?.with_push_file(&push))
+        let first = Self::load_file(&observe)?.with_push_file(&push)?;
+        first.for_all_threads(|| Self::read_file(&observe)?.with_push_read(&push))
     }
 
     /// Loads sigma_o alone, to score observations.
@@ -75,18 +79,18 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn load_observation(directory: &Path) -> Result<Self> {
-        Self::for_all_threads(|| Self::load_file(&directory.join(OBSERVE_WEIGHTS)))
+        let path = directory.join(OBSERVE_WEIGHTS);
+        Self::load_file(&path)?.for_all_threads(|| Self::read_file(&path))
     }
 
-    /// Networks for each of rayon's threads.
-    fn for_all_threads(once: impl Fn() -> Result<Self>) -> Result<Self> {
-        let mut update = once()?;
+    /// Networks for each of rayon's threads: these, and what `again` reads.
+    fn for_all_threads(mut self, again: impl Fn() -> Result<Self>) -> Result<Self> {
         // A graphics card computes for all threads in turn.
-        let copies = if update.device() == Device::Cpu { rayon::current_num_threads() } else { 1 };
+        let copies = if self.device() == Device::Cpu { rayon::current_num_threads() } else { 1 };
         for _ in 1..copies {
-            update.pool.0.append(&mut once()?.pool.0);
+            self.pool.0.append(&mut again()?.pool.0);
         }
-        Ok(update)
+        Ok(self)
     }
 
     /// Loads sigma_o from its file.
@@ -94,6 +98,12 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn load_file(path: &Path) -> Result<Self> {
+        let mut update = Self::read_file(path)?;
+        update.weights.sigma_o = Some(sha256_of_file(path)?);
+        Ok(update)
+    }
+
+    fn read_file(path: &Path) -> Result<Self> {
         is_there(path, "observe")?;
         let (net, store, card) = load_network::<ObserveNet>(path, super::chosen_device()?)?;
         Ok(Self::of(net, store, card))
@@ -104,6 +114,12 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn with_push_file(self, path: &Path) -> Result<Self> {
+        let mut update = self.with_push_read(path)?;
+        update.weights.sigma_m = Some(sha256_of_file(path)?);
+        Ok(update)
+    }
+
+    fn with_push_read(self, path: &Path) -> Result<Self> {
         is_there(path, "push")?;
         let (net, store, card) = load_network::<PushNet>(path, self.device())?;
         Ok(self.with_push(net, store, card.change_temperature.unwrap_or(1.0)))
@@ -111,11 +127,13 @@ impl Cnabu {
 
     /// A belief update of a sigma_o at hand.
     pub fn of(net: ObserveNet, store: VarStore, card: Card) -> Self {
-        Self { pool: Pool(vec![Mutex::new(Networks { observe: net, push: None, stores: vec![store] })]), card }
+        let networks = Networks { observe: net, push: None, stores: vec![store] };
+        Self { pool: Pool(vec![Mutex::new(networks)]), card, weights: Weights::default() }
     }
 
     /// The same with a sigma_m at hand, whose log-odds of change are divided by `temperature`.
-    pub fn with_push(self, net: PushNet, store: VarStore, temperature: f32) -> Self {
+    pub fn with_push(mut self, net: PushNet, store: VarStore, temperature: f32) -> Self {
+        self.weights = Weights { sigma_m: None, change_temperature: Some(temperature), ..self.weights };
         {
             let mut networks = self.pool.take();
             networks.push = Some((net, temperature));
@@ -211,6 +229,15 @@ impl BeliefUpdate for Cnabu {
     /// sigma_o was trained on ten looks; with forty the belief drifts (RESULTS.md).
     fn wears(&self) -> bool {
         true
+    }
+
+    fn networks_used(&self) -> Option<NetworksUsed> {
+        let device = if self.device().is_cuda() { "cuda" } else { "cpu" };
+        Some(NetworksUsed {
+            weights: self.weights.clone(),
+            libtorch: env!("NUDGE_LIBTORCH").to_owned(),
+            device: device.to_owned(),
+        })
     }
 
     /// A grid of other voxels than the networks' ([`BeliefUpdate::check_grid`] refuses it) is updated classically.

@@ -19,6 +19,7 @@ mod report;
 mod robot;
 mod run;
 mod scene;
+mod settings;
 #[cfg(feature = "workbench")]
 mod shot;
 mod train;
@@ -64,6 +65,8 @@ enum Command {
     Mesh(mesh::Args),
     /// Print the poses of a view array
     Views(views::Args),
+    /// Print the planner's settings: units, ranges, defaults and what they mean
+    Settings(settings::Args),
 }
 
 /// Parses the command line, runs the command and turns errors into one line and an exit code: 0 for success, 1 for a
@@ -91,6 +94,7 @@ pub fn main() -> ExitCode {
         Some(Command::Calibrate(args)) => calibrate::run(&args),
         Some(Command::Mesh(args)) => mesh::run(&args),
         Some(Command::Views(args)) => views::run(&args),
+        Some(Command::Settings(args)) => settings::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -129,7 +133,7 @@ impl DeviceArgs {
     }
 }
 
-/// What beliefs are updated by, and what is weighed how.
+/// What is seen, what beliefs are updated by, and what is weighed how.
 #[derive(clap::Args, Debug)]
 struct PlanningArgs {
     /// How beliefs are updated: cnabu or classical (default: what a policy is published with)
@@ -140,6 +144,9 @@ struct PlanningArgs {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
+    /// What the camera gets wrong: nothing, or as much as a consumer depth camera on an arm (depth, labels and poses)
+    #[arg(long, default_value = "none", value_name = "none|standard")]
+    noise: String,
     #[command(flatten)]
     planner: PlannerArgs,
 }

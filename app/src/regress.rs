@@ -232,7 +232,7 @@ impl Golden {
         let mut policies = Vec::new();
         for policy in &self.policies {
             let (update, _) = belief_update(Some(&self.belief), *policy)?;
-            policies.push(PolicyPlan { policy: *policy, belief: update.name().to_owned() });
+            policies.push(PolicyPlan { policy: *policy, belief: update.name().to_owned(), planner: None });
         }
         Ok(Plan {
             format: BENCH_FORMAT,
@@ -241,6 +241,7 @@ impl Golden {
             seeds,
             views: "standard300".to_owned(),
             planner: PlannerSettings::default(),
+            noise: None,
             policies,
             sets: vec![SetPlan { name: "regress".to_owned(), scenes }],
             broken: Vec::new(),

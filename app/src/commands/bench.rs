@@ -9,6 +9,7 @@ use crate::driver::belief_update;
 use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::belief::{CLASSICAL, CNABU};
+use nudge_core::camera::NoiseModel;
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
 use nudge_core::shard::Shard;
@@ -129,12 +130,18 @@ fn run_bench(args: &RunArgs) -> anyhow::Result<()> {
 }
 
 fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
-    let policies = policies(args)?;
+    let mut policies = policies(args)?;
     if args.budget == 0 {
         return Err(Error::Usage("--budget must be at least one action".to_owned()).into());
     }
-    // One setting for the whole bench, so that its policies compare.
+    // What was not asked for is what serves the belief of a policy best, as in a run of the policy alone.
     let belief = if policies.iter().any(|plan| plan.belief == CNABU) { CNABU } else { CLASSICAL };
+    let planner = args.planning.planner.settings(belief)?;
+    for policy in &mut policies {
+        let own = args.planning.planner.settings(&policy.belief)?;
+        policy.planner = (own != planner).then_some(own);
+    }
+    let noise = NoiseModel::named(&args.planning.noise)?;
     let (sets, broken) = load_sets(&args.sets, &Catalog::standard())?;
     nudge_core::camera::ViewArray::named(&args.planning.views)?;
     Ok(Plan {
@@ -143,7 +150,8 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         budget: args.budget,
         seeds: args.seeds,
         views: args.planning.views.clone(),
-        planner: args.planning.planner.settings(belief),
+        planner,
+        noise,
         policies,
         sets,
         broken,
@@ -169,7 +177,7 @@ fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
             // The same words for every policy are said once.
             notes.entry(note.replace(policy.name(), "POLICY")).or_default().push(policy.name());
         }
-        policies.push(PolicyPlan { policy, belief: update.name().to_owned() });
+        policies.push(PolicyPlan { policy, belief: update.name().to_owned(), planner: None });
     }
     for (note, names) in notes {
         warn(

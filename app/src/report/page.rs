@@ -124,10 +124,11 @@ fn set_title(set: &SetPlan) -> String {
 fn colophon(results: &Results) -> String {
     let plan = &results.plan;
     format!(
-        "<footer><p>nudge {}, views {}, {} push candidates, format {}. Scores are of the volume below 0.27 m. Intervals: \
-         percentile bootstrap over scenes, {} resamples (1,000 for bands).</p></footer>\n",
+        "<footer><p>nudge {}, views {}, noise {}, {} push candidates, format {}. Scores are of the volume below 0.27 m. \
+         Intervals: percentile bootstrap over scenes, {} resamples (1,000 for bands).</p></footer>\n",
         escape(&plan.version),
         escape(&plan.views),
+        escape(&nudge_core::camera::NoiseModel::name_of(plan.noise)),
         plan.planner.candidates,
         plan.format,
         nudge_core::score::RESAMPLES

@@ -66,15 +66,26 @@ impl Evidence {
 
     /// The same with left and right exchanged; for planes without padding.
     pub fn mirrored(&self) -> Self {
-        Self { occupancy: mirrored(&self.occupancy), semantics: mirrored(&self.semantics) }
+        let cells = 2 * self.occupancy.size()[2];
+        Self { occupancy: mirrored(&self.occupancy, cells), semantics: mirrored(&self.semantics, cells) }
     }
 }
 
-/// Planes (`[B, quantities * 4, X, Y]`) with left and right exchanged; for planes without padding.
-fn mirrored(planes: &Tensor) -> Tensor {
+/// Planes (`[B, quantities * 4, X, Y]`) with left and right exchanged among the first `cells` floor cells along x. What lies
+/// beyond is padding, and stays: the shelf is mirrored, not its surroundings.
+fn mirrored(planes: &Tensor, cells: i64) -> Tensor {
     let size = planes.size();
     // A channel is a quantity and a sub-cell `2 (x % 2) + y % 2`; along x both pixels and sub-cells turn round.
-    planes.view([size[0], -1, 2, 2, size[2], size[3]]).flip([2, 4]).view(&size[..])
+    let folded = planes.view([size[0], -1, 2, 2, size[2], size[3]]);
+    let all = 2 * size[2];
+    if cells == all {
+        return folded.flip([2, 4]).view(&size[..]);
+    }
+    // Sub-cells beside their pixels, so that floor cells along x are one axis.
+    let order: Vec<i64> = (0..cells).rev().chain(cells..all).collect();
+    let order = Tensor::from_slice(&order).to_device(planes.device());
+    let rows = folded.permute([0, 1, 3, 4, 2, 5]).reshape([size[0], -1, 2, all, size[3]]).index_select(3, &order);
+    rows.view([size[0], -1, 2, size[2], 2, size[3]]).permute([0, 1, 4, 2, 3, 5]).reshape(&size[..])
 }
 
 /// The network sigma_o.
@@ -176,8 +187,15 @@ impl ObserveNet {
 
     /// The posterior that [`ObserveNet::forward`] gives for the scene and for its mirror image, turned back: the mean of both
     /// `z`. What stands in a shelf does not depend on which side is called left, and where the two disagree neither is
-    /// certain. For planes without padding.
-    pub fn forward_both_ways(&self, prior: &Evidence, observed: &Tensor, labels: &Tensor) -> (Tensor, Tensor) {
+    /// certain. The shelf is `cells` floor cells wide; what the planes hold beyond that is padding.
+    pub fn forward_both_ways(
+        &self,
+        prior: &Evidence,
+        observed: &Tensor,
+        labels: &Tensor,
+        cells: usize,
+    ) -> (Tensor, Tensor) {
+        let mirrored = |planes: &Tensor| mirrored(planes, cells as i64);
         let both = |planes: &Tensor| Tensor::cat(&[planes, &mirrored(planes)], 0);
         let prior = Evidence { occupancy: both(&prior.occupancy), semantics: both(&prior.semantics) };
         let (z_occupancy, z_semantics) = self.forward(&prior, &both(observed), &both(labels));
@@ -209,15 +227,27 @@ mod tests {
         let prior = Evidence { occupancy: planes(2 * OCCUPANCY), semantics: planes(SEMANTICS) };
         let (observed, labels) = (planes(2 * OCCUPANCY).round(), planes(LABELS).round());
         let far = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]);
+        let mirrored = |planes: &Tensor| mirrored(planes, 32);
         tch::no_grad(|| {
-            let here = net.forward_both_ways(&prior, &observed, &labels);
-            let there = net.forward_both_ways(&prior.mirrored(), &mirrored(&observed), &mirrored(&labels));
+            let here = net.forward_both_ways(&prior, &observed, &labels, 32);
+            let there = net.forward_both_ways(&prior.mirrored(), &mirrored(&observed), &mirrored(&labels), 32);
             assert!(far(&mirrored(&here.0), &there.0) < 1e-4 && far(&mirrored(&here.1), &there.1) < 1e-4);
             // One way alone does not: the network would have to have learned it.
             let alone = net.forward(&prior, &observed, &labels);
             let turned = net.forward(&prior.mirrored(), &mirrored(&observed), &mirrored(&labels));
             assert!(far(&mirrored(&alone.0), &turned.0) > 1e-2);
         });
+    }
+
+    #[test]
+    fn only_the_shelf_is_mirrored_and_not_its_padding() {
+        // Two sub-cells along x and one row: four floor cells, numbered along x, of which three are the shelf.
+        let planes = Tensor::from_slice(&[0_i64, 2, 0, 2, 1, 3, 1, 3]).reshape([1, 4, 2, 1]);
+        let turned = Vec::<i64>::try_from(mirrored(&planes, 3).flatten(0, -1)).expect("numbers");
+        assert_eq!(turned, [2, 0, 2, 0, 1, 3, 1, 3]);
+        assert!(mirrored(&mirrored(&planes, 3), 3).equal(&planes), "twice is as it was");
+        let turned = Vec::<i64>::try_from(mirrored(&planes, 4).flatten(0, -1)).expect("numbers");
+        assert_eq!(turned, [3, 1, 3, 1, 2, 0, 2, 0]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What views are worth: rays or coverage.
 //!
-//! Where all voxels count, a view gains what its rays meet ([`gain_of_views`], the paper's formula). Where only unseen ones
-//! do, each counts once ([`Coverage`]).
+//! Where all voxels count, a view gains what its rays meet ([`gain_of_views`], the gain that the paper takes from Delmerico
+//! et al. 2018). Where only unseen ones do, each counts once ([`Coverage`]).
 //!
 //! Before the first look a belief knows nothing, and with `p = 0.5` everywhere no ray gets farther than a few voxels: every
 //! view that shows the shelf's front is as good. But things stand on the board, so until something was seen, a voxel without

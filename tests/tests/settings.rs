@@ -68,6 +68,12 @@ fn the_table_of_settings_is_the_help_of_run_and_bench() {
         }
         assert!(marked.contains(&format!("| `{option}` |")) && marked.contains(help), "{option}");
     }
+    // The page of the commands is written by hand, for people: it may say things its own way, but must not miss one.
+    if let Ok(page) = std::fs::read_to_string(nudge_tests::root().join("docs/commands.md")) {
+        let missing: Vec<&str> = rows.iter().filter_map(|row| row["option"].as_str()).collect();
+        let missing: Vec<&str> = missing.into_iter().filter(|option| !page.contains(&format!("`{option}`"))).collect();
+        assert!(missing.is_empty(), "docs/commands.md does not tell of {missing:?}");
+    }
     assert!(run.contains("[a number from 0.1 to 100; default: 1, or 10 with --gain unseen]"), "{run}");
     assert!(run.contains("[default: all, or unseen with the cnabu belief]"), "{run}");
 }

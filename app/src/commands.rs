@@ -20,6 +20,7 @@ mod report;
 mod robot;
 mod run;
 mod scene;
+mod settings;
 #[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod shot;
 mod train;
@@ -63,6 +64,8 @@ enum Command {
     Mesh(mesh::Args),
     /// Print the poses of a view array
     Views(views::Args),
+    /// Print the planner's settings: units, ranges, defaults and what they mean
+    Settings(settings::Args),
 }
 
 /// Parses the command line, runs the command and turns errors into one line and an exit code: 0 for success, 1 for a
@@ -88,6 +91,7 @@ pub fn main() -> ExitCode {
         Some(Command::Calibrate(args)) => calibrate::run(&args),
         Some(Command::Mesh(args)) => mesh::run(&args),
         Some(Command::Views(args)) => views::run(&args),
+        Some(Command::Settings(args)) => settings::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -126,7 +130,7 @@ impl DeviceArgs {
     }
 }
 
-/// What beliefs are updated by, and what is weighed how.
+/// What is seen, what beliefs are updated by, and what is weighed how.
 #[derive(clap::Args, Debug)]
 struct PlanningArgs {
     /// How beliefs are updated: cnabu (the networks) or classical (counting of rays) [default: cnabu; the policy random is
@@ -138,6 +142,9 @@ struct PlanningArgs {
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
+    /// What the camera gets wrong: nothing, or as much as a consumer depth camera on an arm (depth, labels and poses)
+    #[arg(long, default_value = "none", value_name = "none|standard")]
+    noise: String,
     #[command(flatten)]
     planner: PlannerArgs,
 }

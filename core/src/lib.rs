@@ -20,6 +20,7 @@ pub mod gain;
 pub mod grid;
 pub mod learn;
 mod named;
+pub mod places;
 pub mod plan;
 pub mod push;
 pub mod rng;

@@ -53,6 +53,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         open: args.file.clone(),
         form: FormOptions { policy: args.policy, budget: args.budget, seed: args.seed },
         out: args.out.clone(),
+        shipped_scenes: nudge_core::places::SCENES.find().map(|found| found.path),
         remember: args.picture.is_none(),
         script: args.picture.clone().map(|picture| crate::workbench::app::Script { steps: args.steps, picture }),
         serve: args.serve,

@@ -10,6 +10,8 @@ use std::process::ExitCode;
 mod bench;
 mod calibrate;
 mod data;
+mod doctor;
+mod manual;
 mod mesh;
 #[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod open;
@@ -28,11 +30,20 @@ mod views;
 
 /// Manipulation-enhanced mapping of cluttered shelves: look, push, and know how sure you are.
 #[derive(Parser)]
-#[command(name = "nudge", version, about, arg_required_else_help = !cfg!(feature = "workbench"))]
+#[command(name = "nudge", version, about, after_help = ENVIRONMENT, arg_required_else_help = !cfg!(feature = "workbench"))]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
 }
+
+/// What help and the man page say at their end.
+const ENVIRONMENT: &str = "\
+Environment:
+  NUDGE_MODELS  Folder of the networks' weights, in place of those that came with the program
+  NUDGE_SCENES  Folder of scenes, in place of those that came with the program
+  NUDGE_DEVICE  Device of the networks: auto, cpu or cuda
+
+Exit codes: 0 for success, 1 for a check that failed, 2 for wrong use or bad input";
 
 #[derive(Subcommand)]
 enum Command {
@@ -66,6 +77,11 @@ enum Command {
     Views(views::Args),
     /// Print the planner's settings: units, ranges, defaults and what they mean
     Settings(settings::Args),
+    /// Tell what this installation is made of, and what is wrong with it
+    Doctor(doctor::Args),
+    /// Write man pages and shell completions
+    #[command(hide = true)]
+    Manual(manual::Args),
 }
 
 /// Parses the command line, runs the command and turns errors into one line and an exit code: 0 for success, 1 for a
@@ -92,6 +108,8 @@ pub fn main() -> ExitCode {
         Some(Command::Mesh(args)) => mesh::run(&args),
         Some(Command::Views(args)) => views::run(&args),
         Some(Command::Settings(args)) => settings::run(&args),
+        Some(Command::Doctor(args)) => doctor::run(&args),
+        Some(Command::Manual(args)) => manual::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -31,7 +31,7 @@ pub fn facts(made_by: &MadeBy) -> Vec<(&'static str, String)> {
         facts.push(("libtorch", format!("{libtorch}{device}")));
     }
     facts.push(("threads", made_by.threads.to_string()));
-    let settings = settings(&made_by.planner).into_iter().map(|(name, value)| format!("{name} {value}"));
+    let settings = SETTINGS.iter().map(|setting| format!("{} {}", setting.name, setting.value(&made_by.planner)));
     facts.push(("settings", settings.collect::<Vec<_>>().join(", ")));
     facts
 }

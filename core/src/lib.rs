@@ -23,6 +23,7 @@ pub mod grid;
 pub mod learn;
 pub mod made_by;
 mod named;
+pub mod places;
 pub mod plan;
 pub mod push;
 pub mod rng;

@@ -1,10 +1,8 @@
 //! The command line: one file per subcommand.
 
 use crate::planner_args::PlannerArgs;
-use anyhow::Context;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
-use std::io::Write;
 use std::process::ExitCode;
 
 mod bench;
@@ -85,8 +83,15 @@ enum Command {
 }
 
 /// Parses the command line, runs the command and turns errors into one line and an exit code: 0 for success, 1 for a
-/// failed check, 2 for wrong use or bad input.
+/// failed check, 2 for wrong use, bad input, or an output that fails.
 pub fn main() -> ExitCode {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        // What a wall catches is told as an error.
+        if !nudge_core::wall::is_guarding() {
+            hook(panic);
+        }
+    }));
     let result = match Cli::parse().command {
         #[cfg(feature = "workbench")]
         None => open::run(&open::Args::default()),
@@ -111,6 +116,11 @@ pub fn main() -> ExitCode {
         Some(Command::Doctor(args)) => doctor::run(&args),
         Some(Command::Manual(args)) => manual::run(&args),
     };
+    // An output that failed is told when the work is done.
+    let result = result.and_then(|()| match crate::output::take_fault() {
+        Some(error) => Err(anyhow::Error::new(error).context("standard output")),
+        None => Ok(()),
+    });
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -120,13 +130,11 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Writes a result to standard output; a reader that has seen enough (`| head`) is no failure.
+/// Writes a result to standard output. Always `Ok`, so that a command can end with it: what is wrong with the output is
+/// told when the work is done.
 fn print(text: &str) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        result => result.context("standard output"),
-    }
+    crate::output::print(text);
+    Ok(())
 }
 
 /// A document as indented JSON with a line's end.

@@ -1,7 +1,8 @@
 //! This program as a maker of numbers, and what made numbers in words.
 
 use nudge_core::belief::Weights;
-use nudge_core::made_by::{Build, MadeBy, UNKNOWN, settings};
+use nudge_core::made_by::{Build, MadeBy, UNKNOWN};
+use nudge_core::plan::SETTINGS;
 
 /// The commit that this program was built from, as its build script found it.
 pub fn build() -> Build {

@@ -18,6 +18,7 @@ pub mod cnabu;
 pub mod episode;
 pub mod error;
 pub mod files;
+mod fixed;
 pub mod gain;
 pub mod grid;
 pub mod learn;
@@ -31,6 +32,7 @@ pub mod scene;
 pub mod score;
 pub mod shard;
 pub mod solid;
+pub mod wall;
 pub mod world;
 
 pub use error::{Error, Result};

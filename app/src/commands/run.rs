@@ -61,6 +61,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let begin_with = |policy, out: &Path| begin(args, policy, scene.clone(), catalog.clone(), out);
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));
     let mut main = begin_with(args.policy, &out)?;
+    for warning in &main.episode().arm().arm.warnings {
+        super::warn(&format!("{}: {warning}", main.episode().arm().arm.name));
+    }
     if let Some(why) = main.episode().why_no_push() {
         super::warn(&why);
     }

@@ -21,4 +21,5 @@ pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
 pub use record::{EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds};
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
+pub(crate) use resume::revisit;
 pub use resume::{Observer, resume, review};

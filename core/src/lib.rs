@@ -3,7 +3,7 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> tool -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> score -> episode -> learn
+//! grid -> solid -> scene -> tool -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> score -> episode -> probe -> learn
 //! ```
 //!
 //! One frame everywhere: x right, y into the shelf (0 at its front edge), z up (0 on the board), x = 0 in the
@@ -21,6 +21,7 @@ pub mod grid;
 pub mod learn;
 mod named;
 pub mod plan;
+pub mod probe;
 pub mod push;
 pub mod rng;
 pub mod scene;

@@ -12,10 +12,12 @@
 //!   across and 20 degrees back to the same on the other side.
 
 mod clearance;
+mod counterfactual;
 mod frontier;
 mod hidden;
 
 pub use clearance::{AVOIDED, ArmClearance};
+pub use counterfactual::{Counterfactual, PushTruth, REACH_DENSITY};
 pub use frontier::frontier;
 
 use crate::arm::{ArmTool, Hit, Obstacle, Push, PushMotion, level_tool};

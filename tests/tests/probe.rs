@@ -71,7 +71,7 @@ fn what_cannot_be_probed_is_told_in_one_line() {
     let out = episode(folder.path(), "5");
     let path = text(&out);
     let refused = |words: &[&str], expected: &str| {
-        let line = nudge_fails(2, &[&["probe"], words].concat());
+        let line = nudge_fails(2, &[&["probe"][..], words].concat());
         assert!(line.contains(expected), "{line}");
     };
     refused(&[path, "--step", "2"], "e5: step 2: has no push candidates");

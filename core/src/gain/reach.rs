@@ -7,13 +7,13 @@ use super::RayDensity;
 use super::field::GainField;
 use super::ray::{Camera, Ray, Tally};
 use super::skip::is_transparent;
-use crate::camera::ViewArray;
+use crate::camera::{View, ViewArray};
 use crate::grid::{Grid, VoxelSet};
 use crate::world::TruthMap;
 use rayon::prelude::*;
 
 /// What all views of an array together reach of a true map.
-pub struct Reach {
+pub struct TrueReach {
     /// Without skip levels, so that a ray visits every voxel on its way.
     field: GainField,
     /// Each ray where it enters, and the position in the padded grid of what stops it.
@@ -22,7 +22,10 @@ pub struct Reach {
     reached: Vec<bool>,
 }
 
-impl Reach {
+/// What some of the views reach: the rays with their stops, and the voxels of the padded grid.
+type Walked = (Vec<(Ray, u32)>, Vec<bool>);
+
+impl TrueReach {
     /// Walks all rays of all views. The result does not depend on the number of threads.
     ///
     /// # Panics
@@ -30,7 +33,7 @@ impl Reach {
     pub fn new(grid: &Grid, truth: &TruthMap, array: &ViewArray, density: RayDensity) -> Self {
         let field = GainField::of_truth(grid, truth);
         let begin = || (Vec::new(), vec![false; field.codes.len()]);
-        let walk = |(mut rays, mut reached): (Vec<(Ray, u32)>, Vec<bool>), view: &crate::camera::View| {
+        let walk = |(mut rays, mut reached): Walked, view: &View| {
             Camera::of(&field, array, view.id).for_each_ray(&field, density, |_, ray| {
                 let mut tally = Reached { reached: &mut reached, stop: 0 };
                 ray.walk(&field, &mut tally);
@@ -39,7 +42,7 @@ impl Reach {
             });
             (rays, reached)
         };
-        let join = |(mut rays, mut reached): (Vec<(Ray, u32)>, Vec<bool>), other: (Vec<(Ray, u32)>, Vec<bool>)| {
+        let join = |(mut rays, mut reached): Walked, other: Walked| {
             rays.extend(other.0);
             reached.iter_mut().zip(other.1).for_each(|(reached, other)| *reached |= other);
             (rays, reached)
@@ -119,7 +122,7 @@ mod tests {
         // Six voxels of 0.1 m into the shelf, and a camera that looks straight into them.
         let grid = Grid::for_shelf([0.1, 0.6, 0.1], 0.1);
         let array = facing([0.0, -0.3, 0.05]);
-        let reach = Reach::new(&grid, &truth(&grid, &[2]), &array, EVERY);
+        let reach = TrueReach::new(&grid, &truth(&grid, &[2]), &array, EVERY);
         let listed = |set: VoxelSet| set.iter().collect::<Vec<_>>();
         assert_eq!(listed(reach.reached()), [0, 1, 2]);
         assert_eq!(listed(reach.opened(&truth(&grid, &[]))), [3, 4, 5]);
@@ -147,8 +150,8 @@ mod tests {
         let mut total = 0;
         for seed in 0..6 {
             let (before, after) = (random(seed), random(100 + seed));
-            let reach = Reach::new(&grid, &before, &array, density);
-            let mut expected = Reach::new(&grid, &after, &array, density).reached();
+            let reach = TrueReach::new(&grid, &before, &array, density);
+            let mut expected = TrueReach::new(&grid, &after, &array, density).reached();
             expected.subtract(&reach.reached());
             assert!(reach.opened(&after) == expected);
             total += expected.len();
@@ -159,7 +162,7 @@ mod tests {
     #[test]
     fn nothing_outside_the_shelf_is_reached() {
         let grid = small_grid();
-        let reach = Reach::new(&grid, &truth(&grid, &[]), &looking([0.0, -0.3, 0.2], [0.0, 0.2, 0.2]), EVERY);
+        let reach = TrueReach::new(&grid, &truth(&grid, &[]), &looking([0.0, -0.3, 0.2], [0.0, 0.2, 0.2]), EVERY);
         let reached = reach.reached().len();
         assert!(reached > grid.voxel_count() / 2 && reached <= grid.voxel_count(), "{reached}");
     }

@@ -5,14 +5,14 @@
 //!
 //! * Objects: those of which a view of the array shows 25 pixels or more ([`crate::camera::UNSEEN_PX`]) after the push and
 //!   none did before, and the other way round. Exact, at the array's full resolution, from all its views.
-//! * Space: voxels that no look has seen, that no view reaches before the push and one reaches after it ([`Reach`]). What was
+//! * Space: voxels that no look has seen, that no view reaches before the push and one reaches after it ([`TrueReach`]). What was
 //!   inside an object before is not counted: that it is free now is no news of anything else. All views, one ray in
 //!   [`REACH_DENSITY`] pixels along both axes: rays of many views fill each other's gaps.
 
 use crate::arm::{ArmTool, PushMotion};
 use crate::belief::{Belief, bernoulli_entropy, beta_mean};
 use crate::camera::{ViewArray, hidden_objects};
-use crate::gain::{RayDensity, Reach};
+use crate::gain::{RayDensity, TrueReach};
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::{Body, ObjectId};
 use crate::world::{TruthMap, World};
@@ -66,7 +66,7 @@ pub struct Counterfactual<'a> {
     grid: Grid,
     bodies: Vec<Body>,
     hidden: Vec<ObjectId>,
-    reach: Reach,
+    reach: TrueReach,
     /// Voxels that no push opens: seen, or inside an object.
     known: VoxelSet,
 }
@@ -80,7 +80,7 @@ impl<'a> Counterfactual<'a> {
         truth.occupancy.iter().enumerate().filter(|(_, filled)| **filled != 0).for_each(|(at, _)| known.insert(at));
         Self {
             hidden: hidden_objects(world.shelf(), &bodies, views),
-            reach: Reach::new(&grid, &truth, views, REACH_DENSITY),
+            reach: TrueReach::new(&grid, &truth, views, REACH_DENSITY),
             world,
             arm,
             views,

@@ -1,4 +1,4 @@
-//! The experiments: every policy on every scene of some sets, a few seeds each.
+//! Benches: every policy on every scene of some sets, a few seeds each.
 //!
 //! A [`Plan`] says which episodes a bench consists of; [`BenchDir`] keeps one small file per finished episode, so that a
 //! kill loses no more than the episodes that were running; [`run`] works through what is missing, several episodes at

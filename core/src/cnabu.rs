@@ -3,8 +3,8 @@
 //! Both are residual U-Nets over the floor plan whose channels are the heights; they give evidence, a Beta per voxel and a
 //! Dirichlet per floor cell, and are trained with evidential losses on our own simulated data ([`crate::learn`]).
 //!
-//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has this module's
-//! door only: [`AVAILABLE`] is false, and [`load`] says so.
+//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has only
+//! [`AVAILABLE`], which is false, and [`load`], which returns an error.
 
 #[cfg(feature = "cnabu")]
 mod layout;
@@ -79,7 +79,7 @@ pub fn models_dir() -> Option<PathBuf> {
     beside.chain(rest).find(|directory| directory.join(OBSERVE_WEIGHTS).is_file())
 }
 
-/// What [`choose_device`] was told.
+/// The device that [`choose_device`] chose.
 static CHOSEN: OnceLock<String> = OnceLock::new();
 
 /// Chooses the device that weights are loaded onto, before [`DEVICE_ENV`]; the first choice holds.

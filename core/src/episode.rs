@@ -3,8 +3,9 @@
 //! [`Episode`] is a state machine that the command line and the window drive one action at a time: [`Episode::decide`]
 //! says what the policy would do and changes nothing, [`Episode::act`] does it. A clone is a branch.
 //!
-//! The directory that an episode is written to, step by step, is [`EpisodeDir`]. [`resume`] goes on with a directory
-//! whose run was stopped; [`review`] looks at one without writing; [`replay`] runs one again from its log and verifies every step.
+//! The directory that an episode is written to, step by step, is [`EpisodeDir`]. [`resume`] continues a directory whose
+//! run was stopped; [`review`] opens one without writing; [`replay`] runs one again from its log and verifies every
+//! step.
 
 mod directory;
 mod document;

@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all.
+//! Atomic file writing: a file is there whole or not at all.
 //!
 //! A file is written beside its place under a name that starts with [`TEMPORARY`] and then renamed over it. A process
 //! that is killed leaves at most one such leftover, which the next writer removes.

@@ -1,4 +1,4 @@
-//! Joining the directories of shards into one bench.
+//! Merging the directories of shards into one bench.
 
 use super::plan::Plan;
 use super::store::BenchDir;

@@ -36,7 +36,7 @@ pub struct EpisodeResult {
     pub prior: Scores,
     /// The steps.
     pub steps: Vec<StepResult>,
-    /// What became of the objects in the end.
+    /// The verdicts on the objects at the end.
     pub verdicts: Vec<ObjectVerdict>,
     /// The counts behind the scores after half of the budget and at the end, by number of actions.
     pub tallies: Vec<(usize, Tally)>,
@@ -55,7 +55,7 @@ pub struct StepResult {
     pub igm: f32,
     /// Disturbance of the best push, nats.
     pub reg: f32,
-    /// Gain that the view which was looked from had promised, nats; `None` for a push.
+    /// Gain that was expected of the chosen view, nats; `None` for a push.
     pub gain: Option<f32>,
     /// Scores after the step.
     pub scores: Scores,
@@ -72,11 +72,11 @@ pub struct StepResult {
 pub struct VerdictCounts {
     /// Found.
     pub found: usize,
-    /// Taken for another class.
+    /// Misclassified.
     pub misclassified: usize,
     /// Not found.
     pub not_found: usize,
-    /// Made up.
+    /// Hallucinated.
     pub hallucinated: usize,
 }
 

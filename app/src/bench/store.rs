@@ -88,7 +88,7 @@ impl BenchDir {
         Ok(plan)
     }
 
-    /// Whether an episode is finished: whether its result is there and belongs to the plan.
+    /// The result of an episode, if it is finished.
     ///
     /// # Errors
     /// For a result that cannot be read or belongs to something else: nothing is overwritten in silence.

@@ -149,7 +149,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
 }
 
-/// What held-out pushes gave.
+/// Scores on held-out pushes.
 #[derive(Default)]
 struct Pushed {
     /// By prediction: scores on the floor cells that pushes change.

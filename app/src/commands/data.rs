@@ -38,7 +38,7 @@ struct MakeArgs {
     /// Seed of every sample
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Directory to write to; one that was begun is gone on with
+    /// Directory to write to; an unfinished one is continued
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Make the i-th of every n shards only, i from 0: several processes may share a directory

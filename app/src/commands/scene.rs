@@ -47,7 +47,7 @@ struct NewArgs {
     force: bool,
 }
 
-/// Check scene files, and tell how full they are, how many objects no view shows, and how well a map can be without these
+/// Check scene files: how full they are, how many objects no view shows, and how good a map without these can be
 #[derive(clap::Args, Debug)]
 struct CheckArgs {
     /// Scene files
@@ -146,7 +146,7 @@ struct Facts {
     fill: f32,
     /// Objects unseen from every view, as `class#id`.
     hidden: Vec<String>,
-    /// What a perfect map of all the others has: what is beyond that has to be pushed free, or guessed.
+    /// Scores of a perfect map of all other objects: anything better needs pushes, or a lucky guess.
     without_hidden: Scores,
 }
 

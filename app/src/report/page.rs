@@ -1,4 +1,4 @@
-//! The page itself: everything in one file, readable on a phone and on paper.
+//! The page itself: everything in one file, legible on a phone and on paper.
 
 use super::charts::{self, Figure, SIZE};
 use super::results::Results;

@@ -1,9 +1,9 @@
 //! sigma_o: from prior evidence and an observation to posterior evidence.
 //!
-//! A U-Net sees everything through a narrow stem and completes what was not seen: the far sides and insides of objects.
-//! What is already known does not have to squeeze through it: prior evidence and observation lead past it to the heads,
-//! scaled per level or class, so that an untrained network already adds up what it is told. A semantic head of its own sees
-//! the labels, the prior Dirichlet and a slice of the occupancy posterior 3 cm above the board.
+//! A U-Net sees all inputs through a narrow stem and completes what was not seen: the back sides and insides of
+//! objects. Skip connections lead prior evidence and observation past it to the heads, scaled per level or class, so
+//! that already an untrained network adds the observation to the prior. A semantic head of its own sees the labels, the
+//! prior Dirichlet and a slice of the occupancy posterior 3 cm above the board.
 
 use super::layout::{LABELS, LEVELS, OCCUPANCY, SEMANTICS, SUBS};
 use super::net::{Network, UNet, conv};
@@ -13,12 +13,12 @@ use tch::{Kind, Tensor};
 
 /// Level of the slice that the semantic head sees: 3 cm above the board.
 const SLICE_LEVEL: i64 = 3;
-/// Largest `ln a` that is carried on: evidence of about 1,100.
+/// Largest `ln a` of a state: evidence of about 1,100.
 pub(super) const LOG_EVIDENCE_LIMIT: f64 = 7.0;
 
 /// `z` of `kinds` kinds (occupied and free, or classes; `[B, kinds * ..., X, Y]`) with the evidence limited: where the
-/// largest is above [`LOG_EVIDENCE_LIMIT`] all kinds are lowered alike, so that the mean stays what it was. (Cut one by one,
-/// all kinds above the limit would become equally probable.)
+/// largest is above [`LOG_EVIDENCE_LIMIT`] all kinds are lowered by the same amount, so that the mean does not change.
+/// (Clipped one by one, all kinds above the limit would become equally probable.)
 pub(super) fn limited(z: &Tensor, kinds: usize) -> Tensor {
     let size = z.size();
     let by_kind = z.view([size[0], kinds as i64, -1, size[2], size[3]]);

@@ -17,7 +17,7 @@ const BATCH: usize = 8;
 /// Probability of change below which a floor cell keeps its belief as it is.
 const CHANGE_FLOOR: f32 = 0.05;
 
-/// A push, what it carries along, and the pixels of its window.
+/// A push, the object that it moves, and the pixels of its window.
 pub(crate) struct Windowed<'a> {
     pub(crate) push: &'a SweptPush,
     pub(crate) carried: Option<&'a Carried>,
@@ -41,8 +41,8 @@ pub(super) fn values(tensor: &Tensor) -> Vec<f32> {
     out
 }
 
-/// What pushes look like to the network, in windows (of mirrored planes, if so), from the logarithms of the (mirrored)
-/// prior's evidence.
+/// Inputs that describe pushes to the network, in windows (of mirrored planes, if asked for), from the logarithms of
+/// the (mirrored) prior's evidence.
 pub(crate) fn push_planes(layout: &Layout, prior: &Numbers, pushes: &[Windowed<'_>], mirror: Mirror) -> PushPlanes {
     let width = pushes.first().map_or(0, |push| push.x.len());
     let across = layout.pixels()[1];
@@ -272,11 +272,12 @@ fn evidence<const K: usize>(z: [f32; K]) -> [f32; K] {
     z.map(|z| 1.0 + (z - above).exp())
 }
 
-/// What is believed when with probability `p` a cell changes, and then has evidence `after`, and else keeps its evidence.
+/// The belief of a cell that changes with probability `p` and then has evidence `after`, and otherwise keeps its
+/// evidence.
 ///
-/// The means are mixed, `P = (1 - p) P_kept + p P_changed`, and so are the epistemic uncertainties `K / sum(a)`. (Mixing
-/// the evidence itself, `(1 - p) a + p a_changed`, would let what was once well known drown a prediction that is
-/// honestly unsure, however probable the change.)
+/// The means are mixed, `P = (1 - p) P_kept + p P_changed`, and so are the epistemic uncertainties `K / sum(a)`.
+/// (Mixing the evidence itself, `(1 - p) a + p a_changed`, would let large old evidence outweigh an uncertain
+/// prediction, however probable the change is.)
 #[inline(always)]
 fn gated<const K: usize>(kept: &[f32; K], after: &[f32; K], p: f32) -> [f32; K] {
     let [kept_weight, after_weight] = [(kept, 1.0 - p), (after, p)].map(|(a, share)| share / a.iter().sum::<f32>());

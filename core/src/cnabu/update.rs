@@ -189,7 +189,7 @@ pub(crate) fn belief_of(layout: &Layout, evidence: &Evidence) -> Belief {
     layout.belief(&values(&evidence.occupancy), &values(&evidence.semantics))
 }
 
-/// What an observation looks like to sigma_o: levels and labels.
+/// Inputs of sigma_o that describe an observation: levels and labels.
 pub(crate) fn observation_planes(layout: &Layout, observation: &MapObservation, mirror: Mirror) -> (Tensor, Tensor) {
     let plane = layout.plane();
     let (mut observed, mut labels) = (vec![0.0; 2 * OCCUPANCY * plane], vec![0.0; LABELS * plane]);
@@ -208,7 +208,7 @@ impl BeliefUpdate for Cnabu {
         Layout::new(grid).map(|_| ())
     }
 
-    /// sigma_o learned to take in ten looks; by forty its map of what is seen has worn (RESULTS.md).
+    /// sigma_o was trained on ten looks; with forty the belief drifts (RESULTS.md).
     fn wears(&self) -> bool {
         true
     }

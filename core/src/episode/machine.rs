@@ -270,14 +270,15 @@ impl Episode {
         format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
     }
 
-    /// The prediction that becomes the belief after a push: for a policy that predicts its pushes, and for a person's.
+    /// The prediction that becomes the belief after a push, for policies that predict pushes and for pushes that a
+    /// person chose; `None` for the other policies.
     fn predict(&self, swept: &SweptPush, reason: Reason) -> Option<PushPrediction> {
         (self.record.config.policy.predicts_pushes() || reason == Reason::Manual)
             .then(|| self.update.predict_pushes(&self.belief, std::slice::from_ref(swept)).pop())
             .flatten()
     }
 
-    /// What a view sees now, noise included: an oracle that asks sees what it will get.
+    /// What a view sees now, noise included: the oracle sees the very image that a look would give.
     fn observe(&self, view: &View) -> (Image, MapObservation) {
         let (shelf, intrinsics) = (self.world.shelf(), &self.views.intrinsics);
         let noise = self.record.config.noise.unwrap_or(NoiseModel::OFF);
@@ -327,7 +328,7 @@ impl Episode {
         self.record = logged;
     }
 
-    /// Takes prior or last step of a log, with what is filed of belief and truth, in place of what repeating them led to.
+    /// Replaces the repeated prior or last step by the one of a log, with belief and truth from the files.
     pub(super) fn adopt_state(&mut self, logged: &EpisodeRecord, belief: Belief, truth: StoredTruth) {
         self.record.prior = logged.prior;
         if let Some(step) = self.record.steps.last_mut() {
@@ -348,8 +349,8 @@ impl Episode {
         self.record.steps.len() >= self.record.config.budget
     }
 
-    /// The voxels that do not count as a gain, when only unseen ones do: those that looks have seen and that no push may
-    /// have changed since.
+    /// The voxels that do not count as a gain, where only unseen ones do: those that looks have seen and that no push
+    /// has probably changed since.
     pub fn seen(&self) -> Option<&VoxelSet> {
         (self.record.config.planner.counted == Counted::Unseen).then_some(self.sightings.seen())
     }

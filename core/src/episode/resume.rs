@@ -1,4 +1,4 @@
-//! Opening an episode again: to go on with a run that was stopped, or to look at it.
+//! Opening an episode again: to continue a run that was stopped, or to look at it.
 
 use super::directory::EpisodeDir;
 use super::machine::Episode;
@@ -11,12 +11,12 @@ use crate::{Error, Result};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Is shown an episode on its way, with what the last action brought.
+/// Called for every state of an episode that is opened, with the outcome of the last action.
 pub type Observer<'a> = &'a mut dyn FnMut(&Episode, Option<&StepOutcome>) -> Result<()>;
 
-/// Opens the episode in `path` to go on with it: repeats the actions of its log without deciding anew, and verifies
-/// after every one that belief, truth and scores are those in the directory, the beliefs bit for bit. `observer` is shown
-/// the prior (without an outcome) and every action once it is verified, so that a recording can be made anew.
+/// Opens the episode in `path` to continue it: repeats the actions of its log without deciding anew, and verifies after
+/// every one that belief, truth and scores are those in the directory, the beliefs bit for bit. `observer` is called
+/// for the prior (without an outcome) and for every action once it is verified, so that a recording can be made anew.
 ///
 /// # Errors
 /// [`Error::Input`] or [`Error::Io`] for a directory that holds no episode or a damaged one, [`Error::Check`] when the
@@ -70,7 +70,7 @@ pub(crate) fn revisit(
     Ok(retrace(directory, catalog, update, Departure::Overruled, actions, observer)?.1)
 }
 
-/// Stands for the update that a log names where there is none: leaves every belief as it is.
+/// Placeholder for an update that the log names and this program lacks: leaves every belief as it is.
 struct Absent(String);
 
 impl BeliefUpdate for Absent {
@@ -92,9 +92,9 @@ impl BeliefUpdate for Absent {
 enum Departure {
     /// End with an error.
     Refused,
-    /// Go on from what is filed, and tell where it began.
+    /// Continue from the files, and report where the difference began.
     Overruled,
-    /// Go on from what is filed after every action, comparing nothing.
+    /// Continue from the files after every action, comparing nothing.
     Expected,
 }
 
@@ -136,7 +136,7 @@ fn retrace(
     Ok((episode, first))
 }
 
-/// The first place where the episode after `done` actions is not what is filed.
+/// The first place where the episode after `done` actions differs from the files.
 fn difference(
     directory: &EpisodeDir,
     logged: &EpisodeRecord,

@@ -67,13 +67,13 @@ impl GainField {
         &self.layout.grid
     }
 
-    /// This field with a push's predicted window in place of what stands there. Voxels that were seen inform no more
-    /// after the push than before: what it makes uncertain of them, looking again only restores.
+    /// This field with a push's predicted window in place of what stands there. Voxels that were seen do not count
+    /// after the push either: looking at them again would only restore what the push made uncertain.
     pub fn with_prediction(&self, prediction: &PushPrediction) -> Self {
         self.patched(prediction).0
     }
 
-    /// This field where the given voxels still block but no longer inform (a view saw them).
+    /// This field where the given voxels still block rays but no longer count as a gain (a view saw them).
     pub fn with_seen(&self, seen: &VoxelSet) -> Self {
         let mut arrival = vec![0.0; self.codes.len()];
         for index in seen.iter() {
@@ -103,7 +103,7 @@ impl GainField {
         Self { layout: self.layout, codes: self.codes.clone(), seen: Some(Arc::new(arrival)) }
     }
 
-    /// Whether it tells seen voxels from others, as [`GainField::with_seen`] makes it.
+    /// Whether it distinguishes seen voxels, as made by [`GainField::with_seen`].
     pub fn knows_seen(&self) -> bool {
         self.seen.is_some()
     }

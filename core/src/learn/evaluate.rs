@@ -1,4 +1,4 @@
-//! How well a belief update does on held-out scenes, against the number of views.
+//! Scores of a belief update on held-out scenes, against the number of views.
 
 use super::{Dataset, MapSample, PushSample, PushedSample, VIEWS, VIEWS_AFTER, ViewSample};
 use crate::Result;
@@ -9,7 +9,7 @@ use crate::world::TruthMap;
 
 /// Counts after one to [`VIEWS`] views over a set of map samples: entry `v - 1` is after `v` views.
 ///
-/// `progress` is told how many samples are done.
+/// `progress` is called with the number of samples that are done.
 ///
 /// # Errors
 /// When a sample cannot be read.
@@ -45,7 +45,7 @@ pub struct PushTallies {
 /// How well pushes are predicted, over a set of push samples: the belief after a sample's views against the truth after
 /// each of its pushes, on the floor cells that the push changes. `observe` makes the beliefs and `predict` the predictions.
 ///
-/// `progress` is told how many samples are done.
+/// `progress` is called with the number of samples that are done.
 ///
 /// # Errors
 /// When a sample cannot be read.
@@ -138,7 +138,7 @@ fn best_temperature(outcomes: &[(f64, bool)]) -> f64 {
 /// Counts on the whole map after the first push of every sample: entry `v` is of the belief that was predicted, updated with
 /// `v` views of what the push left.
 ///
-/// `progress` is told how many samples are done.
+/// `progress` is called with the number of samples that are done.
 ///
 /// # Errors
 /// When a sample cannot be read.

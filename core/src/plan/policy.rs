@@ -1,4 +1,4 @@
-//! The policies by name, and what each of them stands for.
+//! The policies by name, and what each of them does.
 
 use crate::belief::{CLASSICAL, CNABU};
 use crate::named;
@@ -11,7 +11,7 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PolicyKind {
-    /// The rule above.
+    /// Best view or best push, by the rule of [`look_or_push`](super::look_or_push).
     Mem,
     /// Best view, never a push.
     MemNoPush,
@@ -38,7 +38,7 @@ pub enum PolicyKind {
 }
 
 impl PolicyKind {
-    /// Every policy, in the order of the method's table.
+    /// Every policy, in the order of the table in METHOD.md.
     pub const ALL: [Self; 10] = [
         Self::Mem,
         Self::MemNoPush,

@@ -1,4 +1,4 @@
-//! What pushes are worth: IGM and Reg of every candidate.
+//! The worth of pushes: IGM and Reg of every candidate.
 
 use super::{CandidateRecord, Counted, PlannerSettings, Situation, look};
 use crate::arm::{ArmTool, PushMotion};
@@ -51,10 +51,11 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
 
 /// Draws candidates and weighs the feasible ones.
 ///
-/// Where all voxels count, a push is worth the best single view after it: a coarse ranking first, then the winner with all
-/// views and rays. A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones. A push
-/// clears the list of used views, so every view counts. Where only unseen voxels count, a push is worth what it opens to
-/// the coarse views together ([`Openings`]), and of these the best one after the winner is named, for the eye only.
+/// Where all voxels count, a push is worth the best single view after it: a coarse ranking first, then the winner with
+/// all views and rays. A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones.
+/// A push clears the list of used views, so every view counts. Where only unseen voxels count, a push is worth what it
+/// opens to the coarse views together ([`Openings`]), and the best of these views after the winner is reported for
+/// display only.
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
     let actions = situation.history.actions.len();

@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Stretch every object of scenes by random factors, moved no further apart than that takes
+/// Stretch every object of scenes by random factors; objects that then overlap are moved apart as little as possible
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// Scene files

@@ -100,7 +100,7 @@ fn write(path: &Path, card: &Card, weights: &[(String, Tensor)], halved: bool) -
     card.write(path)
 }
 
-/// Tells the card how its weights came about, as a command that can be typed again, and settings.
+/// Writes to the card how its weights were made: the command that makes the data, and the settings.
 fn describe<S: Sample>(
     card: &mut Card,
     args: &ExportArgs,

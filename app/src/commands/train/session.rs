@@ -1,4 +1,4 @@
-//! What a training run does beside training: it reports, keeps checkpoints, validates, and knows when to stop.
+//! What a training run does beside training: reports, checkpoints, validation, and stopping.
 
 use super::curve::Curve;
 use super::{SessionArgs, lineage};
@@ -20,7 +20,7 @@ pub(super) trait Pupil {
     fn save(&self, out: &Path) -> nudge_core::Result<()>;
     /// Updates of the weights so far.
     fn updates(&self) -> u64;
-    /// Scores the running mean of the weights; what is to fall.
+    /// Validates the running mean of the weights; returns the error, lower is better.
     fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64>;
 }
 
@@ -44,8 +44,8 @@ impl SessionArgs {
         nudge_core::cnabu::device(&self.device)
     }
 
-    /// The network as the run begins or goes on: fresh, from its own checkpoint, that of another run, or finished weights.
-    /// Refuses to write over a run that is there.
+    /// The network at the start of the run: fresh, from its own checkpoint, from that of another run, or from finished
+    /// weights. Refuses to write over a run that is there.
     pub(super) fn trainer<N: Network>(
         &self,
         settings: TrainSettings,

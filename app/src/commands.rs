@@ -14,6 +14,7 @@ mod mesh;
 #[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod open;
 mod progress;
+mod probe;
 mod regress;
 mod replay;
 mod report;
@@ -55,6 +56,8 @@ enum Command {
     Bench(bench::Args),
     /// Re-run an episode from its log and verify every step
     Replay(replay::Args),
+    /// Carry out every push candidate of a decision, and hold what was promised against what it really does
+    Probe(probe::Args),
     /// Hold the scores of a small fixed bench against golden ones
     Regress(regress::Args),
     /// Make a page of tables and charts of a bench
@@ -103,6 +106,7 @@ pub fn main() -> ExitCode {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Probe(args)) => probe::run(&args),
         Some(Command::Regress(args)) => regress::run(&args),
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Scene(args)) => scene::run(&args),

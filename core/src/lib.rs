@@ -3,10 +3,10 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> made_by -> score -> episode -> learn
+//! grid -> solid -> scene -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> made_by -> score -> episode -> probe -> learn
 //! ```
 //!
-//! Beside them stand what all of them may use: [`error`], [`files`], [`rng`] and [`shard`].
+//! Beside them stand what all of them may use: [`error`], [`files`], [`places`], [`rng`] and [`shard`].
 //!
 //! One frame everywhere: x right, y into the shelf (0 at its front edge), z up (0 on the board), x = 0 in the
 //! middle of the shelf; metres, right-handed. Entropy and gain are in nats.
@@ -26,6 +26,7 @@ pub mod made_by;
 mod named;
 pub mod places;
 pub mod plan;
+pub mod probe;
 pub mod push;
 pub mod rng;
 pub mod scene;

@@ -16,14 +16,14 @@ pub use look::{gain_field, gain_sources};
 pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
-pub use weigh::{COARSE_VIEWS, disturbance};
+pub use weigh::{COARSE_VIEWS, disturbance, draw_pushes};
 
 use crate::arm::{ArmTool, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CNABU};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
 use crate::named;
-use crate::push::Rejection;
+use crate::push::{PushTruth, Rejection};
 use serde::{Deserialize, Serialize};
 
 /// What the robot does at one step.
@@ -49,6 +49,8 @@ pub enum Reason {
     PushTellsLittle,
     /// Pushing tells more: `IGV <= IGM + gamma Reg`.
     PushTellsMore,
+    /// The push really brings objects into sight: of the clairvoyant policy alone.
+    PushReveals,
     /// Right after a push: the view for which the push was chosen.
     ViewOfPush,
     /// No push in the first steps.
@@ -108,9 +110,10 @@ pub struct Decision {
     pub reason: Reason,
     /// Gain of the best pair of views, nats ([`Counted`] says of what).
     pub igv: f32,
-    /// Worth of the best push, nats; 0 when none was weighed.
+    /// Worth of the best push, nats; 0 when none was weighed. Of a clairvoyant policy what is unknown of the space that it
+    /// really opens, not what it promises.
     pub igm: f32,
-    /// Disturbance of the best push, nats, at most 0.
+    /// Disturbance of the best push, nats, at most 0; 0 of a clairvoyant policy.
     pub reg: f32,
     /// First and second view of the best pair.
     pub pair: Vec<ViewId>,
@@ -119,7 +122,7 @@ pub struct Decision {
     /// The push candidates, in the order drawn.
     #[serde(default)]
     pub candidates: Vec<CandidateRecord>,
-    /// Position of the best push in `candidates`.
+    /// Position of the best push in `candidates`: best by what it promises, of a clairvoyant policy by what it really does.
     #[serde(default)]
     pub best_push: Option<usize>,
     /// The arm's motion for the push that is the action, else for the best one; `None` where none was weighed.
@@ -206,6 +209,8 @@ pub struct Situation<'a> {
     pub seed: u64,
     /// The belief after really looking from a view: for the clairvoyant oracle only.
     pub really_look: &'a (dyn Fn(ViewId) -> Belief + Sync),
+    /// What pushes would really do, one answer per motion: for clairvoyant policies only.
+    pub really_push: &'a (dyn Fn(&[PushMotion]) -> Vec<PushTruth> + Sync),
 }
 
 impl Situation<'_> {

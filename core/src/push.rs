@@ -12,10 +12,12 @@
 //!   the tip before the contact, from -20 to 200 degrees (90 is straight in).
 
 mod clearance;
+mod counterfactual;
 mod frontier;
 mod hidden;
 
 pub use clearance::{AVOIDED, ArmClearance};
+pub use counterfactual::{Counterfactual, PushTruth, REACH_DENSITY};
 pub use frontier::frontier;
 
 use crate::arm::{ArmTool, Hit, Obstacle, Push, PushMotion, level_tool};

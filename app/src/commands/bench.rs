@@ -65,7 +65,7 @@ struct RunArgs {
     /// Sets of scenes: folders of scene files, or single files
     #[arg(required = true, value_name = "SET")]
     sets: Vec<PathBuf>,
-    /// Policies, or `all`
+    /// Policies, or `all`; of these the clairvoyant ones, oracle and clairvoyant-push, take most of the time
     #[arg(long, default_value = "all", value_delimiter = ',', value_name = "A,B")]
     policies: Vec<String>,
     /// Number of seeds; policies that draw nothing at random run once

@@ -18,7 +18,9 @@ use std::time::Instant;
 pub struct Args {
     /// The scene file
     scene: PathBuf,
-    /// The rule that chooses actions
+    /// The rule that chooses actions: mem, mem-no-push, random, random-cnabu, random-push-5, random-push-5-blind,
+    /// random-view-push-5, saturation; and as ceilings, since they know the truth, oracle (the view that really tells most) and
+    /// clairvoyant-push (mem, but each push is carried out in a copy of the world before one is chosen)
     #[arg(long, default_value = "mem")]
     policy: PolicyKind,
     /// Number of actions

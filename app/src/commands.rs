@@ -13,8 +13,8 @@ mod manual;
 mod mesh;
 #[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod open;
-mod progress;
 mod probe;
+mod progress;
 mod regress;
 mod replay;
 mod report;

@@ -55,7 +55,7 @@ mod tests {
     /// This file, whose head lists the modules.
     const SOURCE: &str = include_str!("lib.rs");
     /// What every module may use.
-    const BESIDE: [&str; 5] = ["error", "files", "named", "rng", "shard"];
+    const BESIDE: [&str; 7] = ["error", "files", "fixed", "named", "places", "rng", "shard"];
 
     fn street() -> Vec<&'static str> {
         let line = SOURCE.lines().find(|line| line.contains(" -> ")).expect("the list of modules");

@@ -152,3 +152,26 @@ fn no_networks() -> nudge_core::Error {
 fn warn(message: &str) {
     eprintln!("warning: {message}");
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Cli;
+    use clap::{CommandFactory, Parser};
+
+    #[test]
+    fn help_lists_the_windows_commands_in_every_build() {
+        let help = Cli::command().render_help().to_string();
+        for command in ["open", "shot", "run"] {
+            assert!(help.lines().any(|line| line.trim_start().starts_with(&format!("{command} "))), "{help}");
+        }
+    }
+
+    #[test]
+    #[cfg(not(feature = "workbench"))]
+    fn without_the_window_its_commands_say_so_whatever_is_typed() {
+        let typed = ["nudge", "shot", "out/demo", "--layout", "why", "--out", "why.png"];
+        let Some(super::Command::Shot(args)) = Cli::try_parse_from(typed).expect("taken").command else { panic!() };
+        let said = super::shot::run(&args).expect_err("no window").to_string();
+        assert!(said.contains("make workbench"), "{said}");
+    }
+}

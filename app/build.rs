@@ -1,17 +1,14 @@
-//! Lets the binary find the libtorch that it is linked against by its run path, so that `LD_LIBRARY_PATH` stays out of it;
-//! and tells the program which commit it is built from.
+//! Names the program's run path ([`run_path`]), and tells it which commit it is built from.
+
+#[path = "../scripts/run_path.rs"]
+mod run_path;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-env-changed=LIBTORCH");
-    println!("cargo:rerun-if-env-changed=LIBTORCH_LIB");
-    let folder = std::env::var("LIBTORCH_LIB").or_else(|_| std::env::var("LIBTORCH"));
-    if let (Ok(folder), true) = (folder, cfg!(target_os = "linux")) {
-        println!("cargo:rustc-link-arg=-Wl,-rpath,{folder}/lib");
-    }
+    run_path::main();
     let here = std::env::var("CARGO_MANIFEST_DIR").expect("cargo names the crate's folder");
     let checkout = Path::new(&here).parent().and_then(Checkout::at);
     let state = checkout.and_then(|checkout| checkout.state());

@@ -1,6 +1,8 @@
-//! Lets the binary find the libtorch that it is linked against by its run path, so that `LD_LIBRARY_PATH` stays out of it;
-//! and tells the library what made it: the hash of the method's source, and the version of libtorch.
+//! Names the run path of this crate's tests and benchmarks ([`run_path`]), and tells the library what made it: the hash of
+//! the method's source, and the version of libtorch.
 
+#[path = "../scripts/run_path.rs"]
+mod run_path;
 #[path = "src/made_by/source.rs"]
 mod source;
 
@@ -12,12 +14,8 @@ const COMPUTING: [&str; 6] = ["nalgebra", "parry3d", "rand", "rand_chacha", "rap
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-env-changed=LIBTORCH");
-    println!("cargo:rerun-if-env-changed=LIBTORCH_LIB");
+    run_path::main();
     let folder = std::env::var("LIBTORCH_LIB").or_else(|_| std::env::var("LIBTORCH")).ok();
-    if let (Some(folder), true) = (&folder, cfg!(target_os = "linux")) {
-        println!("cargo:rustc-link-arg=-Wl,-rpath,{folder}/lib");
-    }
     println!("cargo:rustc-env=NUDGE_LIBTORCH={}", folder.as_deref().and_then(libtorch).unwrap_or("unknown".to_owned()));
     println!("cargo:rustc-env=NUDGE_METHOD={}", method());
 }

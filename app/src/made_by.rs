@@ -1,7 +1,8 @@
 //! This program as a maker of numbers, and what made numbers in words.
 
 use nudge_core::belief::Weights;
-use nudge_core::made_by::{Build, MadeBy, UNKNOWN, settings};
+use nudge_core::made_by::{Build, MadeBy, UNKNOWN};
+use nudge_core::plan::SETTINGS;
 
 /// The commit that this program was built from, as its build script found it.
 pub fn build() -> Build {
@@ -31,7 +32,7 @@ pub fn facts(made_by: &MadeBy) -> Vec<(&'static str, String)> {
         facts.push(("libtorch", format!("{libtorch}{device}")));
     }
     facts.push(("threads", made_by.threads.to_string()));
-    let settings = settings(&made_by.planner).into_iter().map(|(name, value)| format!("{name} {value}"));
+    let settings = SETTINGS.iter().map(|setting| format!("{} {}", setting.name, setting.value(&made_by.planner)));
     facts.push(("settings", settings.collect::<Vec<_>>().join(", ")));
     facts
 }

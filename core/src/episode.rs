@@ -24,4 +24,5 @@ pub use record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
+pub(crate) use resume::revisit;
 pub use resume::{Observer, resume, review};

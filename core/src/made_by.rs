@@ -11,9 +11,8 @@
 
 use crate::belief::{NetworksUsed, Weights, short};
 use crate::files::sha256;
-use crate::plan::PlannerSettings;
+use crate::plan::{PlannerSettings, SETTINGS};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 
 #[cfg(test)]
 mod source;
@@ -126,20 +125,11 @@ impl MadeBy {
     }
 }
 
-/// Every setting of the planner with its value, by its name in `episode.json`.
-pub fn settings(planner: &PlannerSettings) -> Vec<(String, String)> {
-    // Through text, so that float32 shows as it does in the file.
-    let text = serde_json::to_string(planner).expect("numbers and names become JSON");
-    let fields: BTreeMap<String, serde_json::Value> = serde_json::from_str(&text).expect("an object");
-    let value = |value: serde_json::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-    fields.into_iter().map(|(name, field)| (name, value(field))).collect()
-}
-
 /// The planner's settings that are other than `before`, in words.
 pub fn settings_differences(now: &PlannerSettings, before: &PlannerSettings) -> Vec<String> {
-    let pairs = settings(now).into_iter().zip(settings(before));
-    let words = |((name, now), (_, before))| format!("the planner's {name} was {before}, now it is {now}");
-    pairs.filter(|(now, before)| now != before).map(words).collect()
+    let values = SETTINGS.iter().map(|setting| (setting.name, setting.value(before), setting.value(now)));
+    let differing = values.filter(|(_, before, now)| before != now);
+    differing.map(|(name, before, now)| format!("--{name} was {before}, now it is {now}")).collect()
 }
 
 #[cfg(test)]
@@ -177,7 +167,7 @@ mod tests {
         assert_ne!(weights.fingerprint, before.fingerprint);
         let planner = PlannerSettings { patience: 3.0, ..PlannerSettings::default() };
         let eager = MadeBy::new(Build::default(), Some(networks("a")), planner, 8);
-        assert_eq!(eager.differences(&before), ["the planner's patience was 1.0, now it is 3.0"]);
+        assert_eq!(eager.differences(&before), ["--patience was 1, now it is 3"]);
         assert_ne!(eager.fingerprint, before.fingerprint);
         let method = MadeBy { method: "f".repeat(64), ..before.clone() };
         let words = method.differences(&before);

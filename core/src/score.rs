@@ -10,6 +10,7 @@ mod confusion;
 mod interval;
 mod known;
 mod objects;
+mod rank;
 mod reliability;
 mod tally;
 
@@ -17,6 +18,7 @@ pub use confusion::Confusion;
 pub use interval::{Interval, RESAMPLES, deviation, mean};
 pub use known::scores_without;
 pub use objects::{SPECK_M2, object_verdicts};
+pub use rank::rank_correlation;
 pub use reliability::{BIN_COUNT, Reliability, ReliabilityBin};
 pub use tally::Tally;
 

@@ -10,6 +10,7 @@ use crate::driver::belief_update;
 use crate::made_by;
 use nudge_core::Error;
 use nudge_core::belief::{CLASSICAL, CNABU};
+use nudge_core::camera::NoiseModel;
 use nudge_core::made_by::MadeBy;
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
@@ -64,7 +65,7 @@ struct RunArgs {
     /// Sets of scenes: folders of scene files, or single files
     #[arg(required = true, value_name = "SET")]
     sets: Vec<PathBuf>,
-    /// Policies, or `all`
+    /// Policies, or `all`; of these the clairvoyant ones, oracle and clairvoyant-push, take most of the time
     #[arg(long, default_value = "all", value_delimiter = ',', value_name = "A,B")]
     policies: Vec<String>,
     /// Number of seeds; policies that draw nothing at random run once
@@ -156,19 +157,24 @@ fn tell_mixed(plan: &Plan) {
 }
 
 fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
-    let policies = policies(args)?;
+    let mut policies = policies(args)?;
     if args.budget == 0 {
         return Err(Error::Usage("--budget must be at least one action".to_owned()).into());
     }
-    // One setting for the whole bench, so that its policies compare.
+    // What was not asked for is what serves the belief of a policy best, as in a run of the policy alone.
     let belief = if policies.iter().any(|plan| plan.belief == CNABU) { CNABU } else { CLASSICAL };
+    let planner = args.planning.planner.settings(belief)?;
+    for policy in &mut policies {
+        let own = args.planning.planner.settings(&policy.belief)?;
+        policy.planner = (own != planner).then_some(own);
+    }
+    let noise = NoiseModel::named(&args.planning.noise)?;
     let (sets, broken) = load_sets(&args.sets, &Catalog::standard())?;
     nudge_core::camera::ViewArray::named(&args.planning.views)?;
-    let planner = args.planning.planner.settings(belief);
     // All policies of a bench share the networks, if they run on any.
     let update = policies.iter().find(|plan| plan.belief == belief);
     let networks = match update {
-        Some(PolicyPlan { policy, belief }) => belief_update(Some(belief), *policy)?.networks_used(),
+        Some(PolicyPlan { policy, belief, .. }) => belief_update(Some(belief), *policy)?.networks_used(),
         None => None,
     };
     Ok(Plan {
@@ -180,6 +186,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         seeds: args.seeds,
         views: args.planning.views.clone(),
         planner,
+        noise,
         policies,
         sets,
         broken,
@@ -199,7 +206,7 @@ fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
     }
     let plan_of = |policy| {
         let update = belief_update(args.planning.belief.as_deref(), policy)?;
-        Ok(PolicyPlan { policy, belief: update.name().to_owned() })
+        Ok(PolicyPlan { policy, belief: update.name().to_owned(), planner: None })
     };
     kinds.into_iter().map(plan_of).collect()
 }

@@ -28,6 +28,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let out = args.out.clone().unwrap_or_else(|| args.bench.join("report"));
     let index = write(&results, &args.bench, &out)?;
-    eprint!("{}", made_by(&results.plan).lines());
+    crate::output::print_error(&made_by(&results.plan).lines());
     print(&format!("{}\n", index.display()))
 }

@@ -4,8 +4,8 @@ mod table;
 
 use super::progress::Progress;
 use crate::driver::{Driver, belief_update, default_out};
-use crate::planner_args;
 use nudge_core::Error;
+use nudge_core::camera::NoiseModel;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
 use nudge_core::plan::{Action, PolicyKind};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
@@ -18,7 +18,9 @@ use std::time::Instant;
 pub struct Args {
     /// The scene file
     scene: PathBuf,
-    /// The rule that chooses actions
+    /// The rule that chooses actions: mem, mem-no-push, random, random-cnabu, random-push-5, random-push-5-blind,
+    /// random-view-push-5, saturation; and as ceilings, since they know the truth, oracle (the view that really tells most) and
+    /// clairvoyant-push (mem, but each push is carried out in a copy of the world before one is chosen)
     #[arg(long, default_value = "mem")]
     policy: PolicyKind,
     /// Number of actions
@@ -61,6 +63,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let begin_with = |policy, out: &Path| begin(args, policy, scene.clone(), catalog.clone(), out);
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));
     let mut main = begin_with(args.policy, &out)?;
+    for warning in &main.episode().arm().arm.warnings {
+        super::warn(&format!("{}: {warning}", main.episode().arm().arm.name));
+    }
     if let Some(why) = main.episode().why_no_push() {
         super::warn(&why);
     }
@@ -109,8 +114,8 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
         seed: args.seed,
         budget: args.budget,
         views: args.planning.views.clone(),
-        planner: args.planning.planner.settings(update.name()),
-        noise: None,
+        planner: args.planning.planner.settings(update.name())?,
+        noise: NoiseModel::named(&args.planning.noise)?,
     };
     if !(args.resume && EpisodeDir::state(out)? == DirectoryState::Episode) {
         let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
@@ -171,14 +176,14 @@ fn same_episode(
     out: &std::path::Path,
 ) -> Result<(), Error> {
     let settings = |config: &EpisodeConfig| {
-        let whole = [
-            ("--policy", config.policy.to_string()),
-            ("--belief", config.belief.clone()),
-            ("--seed", config.seed.to_string()),
-            ("--budget", config.budget.to_string()),
-            ("--views", config.views.clone()),
-        ];
-        whole.into_iter().chain(planner_args::options(&config.planner))
+        [
+            ("policy", config.policy.to_string()),
+            ("belief", config.belief.clone()),
+            ("seed", config.seed.to_string()),
+            ("budget", config.budget.to_string()),
+            ("views", config.views.clone()),
+            ("noise", NoiseModel::name_of(config.noise)),
+        ]
     };
     if logged.scene != *scene {
         let message = format!(
@@ -187,10 +192,42 @@ fn same_episode(
         );
         return Err(Error::input(out, "", message));
     }
-    for ((name, before), (_, now)) in settings(&logged.config).zip(settings(config)) {
-        if before != now {
-            return Err(Error::input(out, "", format!("the episode there was run with {name} {before}, not {now}")));
+    let both = settings(&logged.config).into_iter().zip(settings(config));
+    let mut whole = both.map(|((name, before), (_, now))| (name, before, now)).filter(|(_, before, now)| before != now);
+    let planner = || config.planner.difference(&logged.config.planner);
+    let differs = whole.next().or_else(|| planner().map(|(setting, before, now)| (setting.name, before, now)));
+    differs.map_or(Ok(()), |(name, before, now)| {
+        Err(Error::input(out, "", format!("the episode there was run with --{name} {before}, not {now}")))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nudge_core::plan::{SETTINGS, Values};
+
+    /// An episode whose gamma was another one was gone on with, without a word.
+    #[test]
+    fn going_on_with_other_settings_is_refused_whichever_it_is() {
+        let logged = crate::fixture::play(1).record;
+        let (scene, config) = (logged.scene.clone(), logged.config.clone());
+        let out = std::path::Path::new("there");
+        let refused = |config: &EpisodeConfig| same_episode(&logged, &scene, config, out).err().map(|e| e.to_string());
+        assert_eq!(refused(&config), None);
+        for setting in SETTINGS {
+            let other = match &setting.values {
+                Values::Whole { range: [_, high], .. } => high.to_string(),
+                Values::Real { range: [_, high], .. } => high.to_string(),
+                Values::Choice { choices, .. } => choices[1].name.to_owned(),
+            };
+            let mut planner = config.planner;
+            setting.set(&mut planner, &other).expect("allowed");
+            let said = refused(&EpisodeConfig { planner, ..config.clone() }).expect(setting.name);
+            let before = setting.value(&config.planner);
+            assert_eq!(said, format!("there: the episode there was run with --{} {before}, not {other}", setting.name));
         }
+        let noisy = EpisodeConfig { noise: Some(NoiseModel::STANDARD), ..config };
+        let said = refused(&noisy).expect("other noise");
+        assert_eq!(said, "there: the episode there was run with --noise none, not standard");
     }
-    Ok(())
 }

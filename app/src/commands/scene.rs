@@ -99,11 +99,14 @@ fn template(name: &str, catalog: &Catalog) -> String {
          # voxel_m = 0.005                # edge of a voxel\n\
          # column_closure = true          # above free all is free, below occupied all is occupied\n\n\
          # [meshes]                       # shapes of one's own: class = mesh file, relative to this file\n\
-         # chips_can = \"chips_can.obj\"\n\n\
+         # chips_can = \"chips_can.obj\"\n\
+         # gum_tin = {{ file = \"tin.stl\", unit = \"in\" }}   # m, dm, cm, mm, in, km; guessed where it is left out\n\n\
          # [robot]                        # the arm before the shelf; these are the defaults\n\
          # base = [0.0, -0.70, -0.015]    # origin of its base, as high as the table that it stands on\n\
          # yaw_deg = 0.0                  # turn of the base\n\
-         # urdf = \"my_arm.urdf\"          # an arm of one's own, relative to this file, for the UR5 that Nudge has\n\n\
+         # urdf = \"my_arm.urdf\"          # an arm of one's own, relative to this file, for the UR5 that Nudge has\n\
+         # tool = \"tip\"                 # its link at the finger tip, where that has no usual name\n\
+         # camera = \"lens\"              # its link of the camera in hand\n\n\
          # Classes, with their size along x, y, z in metres:\n"
     );
     for class in &catalog.classes {
@@ -192,6 +195,7 @@ fn check(args: &CheckArgs) -> anyhow::Result<()> {
 fn check_file(file: &Path, catalog: &Catalog, views: &ViewArray) -> nudge_core::Result<(Facts, Vec<String>)> {
     let (scene, mut warnings) = Scene::load(file, catalog)?;
     let arm = ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf);
+    warnings.extend(arm.arm.warnings.iter().map(|warning| format!("{}: {warning}", arm.arm.name)));
     if arm.ready.is_none() {
         warnings.push(format!("{} reaches no place before the shelf from where it stands", arm.arm.name));
     }

@@ -6,6 +6,7 @@ use crate::figure::{RasterStyle, Svg, escape};
 use crate::picture::{self, View};
 use crate::planner_args;
 use nudge_core::Result;
+use nudge_core::camera::NoiseModel;
 use nudge_core::scene::{Catalog, ObjectId};
 use nudge_core::score::{mean, scores_without};
 use std::path::Path;
@@ -95,14 +96,16 @@ fn way_back(results: &Results, finished: &Finished, file: &str, bench_from_page:
         "standard300" => String::new(),
         other => format!(" --views {other}"),
     };
+    let noise = plan.noise.map_or(String::new(), |noise| format!(" --noise {}", NoiseModel::name_of(Some(noise))));
     format!(
-        "<code>nudge run {} --policy {} --belief {} --seed {} --budget {}{}{}</code>",
+        "<code>nudge run {} --policy {} --belief {} --seed {} --budget {}{}{}{}</code>",
         escape(file),
         result.policy,
         escape(&result.belief),
         result.seed,
         result.budget,
         escape(&views),
-        planner_args::to_type(&plan.planner, &result.belief)
+        escape(&noise),
+        planner_args::to_type(plan.planner_of(finished.id.policy), &result.belief)
     )
 }

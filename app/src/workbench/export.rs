@@ -17,7 +17,7 @@ use crate::record::{self, Recorder, Setting, State};
 use image::{ImageBuffer, Pixel, PixelWithColorType};
 use nudge_core::belief::Belief;
 use nudge_core::episode::{EpisodeDir, EpisodeRecord};
-use nudge_core::files::{names_in, temporary_of, write_atomically};
+use nudge_core::files::{names_in, target_of, temporary_of, write_atomically};
 use nudge_core::{Error, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -63,6 +63,7 @@ pub fn write_episode(session: &Session, into: &Path, watch: Watch<'_>) -> Result
 /// # Errors
 /// What the system refuses, and when `watch` says to stop.
 pub fn write_recording(session: &Session, path: &Path, watch: Watch<'_>) -> Result<()> {
+    let path = &target_of(path)?;
     let beside = beside(path)?;
     let written = record_into(session, &record_of(session), &beside, watch)
         .and_then(|()| fs::rename(&beside, path).map_err(|error| Error::io(path, error)));

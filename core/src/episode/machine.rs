@@ -10,7 +10,7 @@ use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, Vi
 use crate::grid::{Grid, VoxelSet};
 use crate::made_by::{Build, MadeBy};
 use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
-use crate::push::ArmClearance;
+use crate::push::{ArmClearance, Candidate, Counterfactual};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::score::{Scores, object_verdicts};
@@ -122,6 +122,7 @@ impl Episode {
             }
             None => (*self.belief).clone(),
         };
+        let really_push = |motions: &[PushMotion]| self.counterfactual().of_each(motions, &|| ());
         let situation = Situation {
             belief: &self.belief,
             update: &*self.update,
@@ -133,6 +134,7 @@ impl Episode {
             budget: self.record.config.budget,
             seed: self.record.config.seed,
             really_look: &really_look,
+            really_push: &really_push,
         };
         let decision = plan::decide(self.record.config.policy, &self.record.config.planner, &situation);
         self.deciding.set(started.elapsed().as_secs_f64());
@@ -275,7 +277,7 @@ impl Episode {
     }
 
     /// `class#id`.
-    fn name(&self, id: ObjectId) -> String {
+    pub(crate) fn name(&self, id: ObjectId) -> String {
         let object = self.record.scene.objects.get(usize::from(id.0));
         format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
     }
@@ -426,6 +428,18 @@ impl Episode {
     /// The catalogue.
     pub fn catalog(&self) -> &Catalog {
         &self.catalog
+    }
+
+    /// The world as it stands, for telling what pushes would really do.
+    pub fn counterfactual(&self) -> Counterfactual<'_> {
+        Counterfactual::new(&self.world, &self.arm, &self.views, self.sightings.seen())
+    }
+
+    /// The push candidates that a decision to be made now draws, whatever the policy makes of them.
+    pub fn draw_pushes(&self) -> Vec<Candidate> {
+        let config = &self.record.config;
+        let actions = self.history.actions.len();
+        plan::draw_pushes(&config.planner, &self.belief, self.seen(), &self.arm, config.seed, actions)
     }
 
     /// How the belief changes.

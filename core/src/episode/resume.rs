@@ -32,7 +32,7 @@ pub fn resume(
     if let Some(words) = directory.record()?.other_weights(&*update) {
         return Err(Error::input(directory.path(), "", format!("cannot be resumed: {words}")));
     }
-    let (episode, _) = retrace(&directory, catalog, update, Departure::Refused, observer)?;
+    let (episode, _) = retrace(&directory, catalog, update, Departure::Refused, usize::MAX, observer)?;
     Ok((directory, episode))
 }
 
@@ -53,12 +53,26 @@ pub fn review(
 ) -> Result<(Episode, Option<Difference>)> {
     let directory = EpisodeDir::open(path.as_ref())?;
     match update {
-        Some(update) => retrace(&directory, catalog, update, Departure::Overruled, observer),
+        Some(update) => retrace(&directory, catalog, update, Departure::Overruled, usize::MAX, observer),
         None => {
             let update = Arc::new(Absent(directory.record()?.config.belief));
-            retrace(&directory, catalog, update, Departure::Expected, observer)
+            retrace(&directory, catalog, update, Departure::Expected, usize::MAX, observer)
         }
     }
+}
+
+/// Goes through the first `actions` actions of an episode as [`review`] does: `observer` is shown the prior and every action.
+///
+/// # Errors
+/// Those of [`review`].
+pub(crate) fn revisit(
+    directory: &EpisodeDir,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    actions: usize,
+    observer: Observer<'_>,
+) -> Result<Option<Difference>> {
+    Ok(retrace(directory, catalog, update, Departure::Overruled, actions, observer)?.1)
 }
 
 /// Placeholder for an update that the log names and this program lacks: leaves every belief as it is.
@@ -89,17 +103,19 @@ enum Departure {
     Expected,
 }
 
+/// Repeats at most `actions` actions of a log.
 fn retrace(
     directory: &EpisodeDir,
     catalog: Arc<Catalog>,
     update: Arc<dyn BeliefUpdate>,
     departure: Departure,
+    actions: usize,
     observer: Observer<'_>,
 ) -> Result<(Episode, Option<Difference>)> {
     let logged = directory.record()?;
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
     let mut first = None;
-    for done in 0..=logged.steps.len() {
+    for done in 0..=logged.steps.len().min(actions) {
         let step = done.checked_sub(1).map(|at| &logged.steps[at]);
         let mut outcome = step.map(|step| episode.act(step.decision.clone())).transpose()?;
         let difference = match departure {
@@ -119,7 +135,9 @@ fn retrace(
         first = first.or(difference);
         observer(&episode, outcome.as_ref())?;
     }
-    episode.adopt_log(logged);
+    if actions >= logged.steps.len() {
+        episode.adopt_log(logged);
+    }
     Ok((episode, first))
 }
 

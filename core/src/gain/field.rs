@@ -5,6 +5,7 @@ use super::{RayDensity, arrivals, skip};
 use crate::belief::{Belief, PushPrediction, beta_mean};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet, Window};
+use crate::world::TruthMap;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -42,6 +43,22 @@ impl GainField {
             }
         });
         skip::mark(&mut codes, &layout, Window::whole(&layout.grid), skip::LEVELS);
+        Self { layout, codes, seen: None }
+    }
+
+    /// A true map, every voxel free or filled, without skip levels as [flat](Self::flat).
+    ///
+    /// # Panics
+    /// If the grid has more than 2,000 voxels along an axis.
+    pub(super) fn of_truth(grid: &Grid, truth: &TruthMap) -> Self {
+        let layout = Layout::of(grid);
+        let mut codes = vec![OPAQUE; layout.len()];
+        for (cell, filled) in truth.occupancy.chunks_exact(grid.dims[2]).enumerate() {
+            let column = layout.column(cell);
+            for (code, filled) in codes[column..].iter_mut().zip(filled) {
+                *code = if *filled == 0 { 0 } else { OPAQUE };
+            }
+        }
         Self { layout, codes, seen: None }
     }
 

@@ -77,7 +77,7 @@ impl Pupil for Observer {
         let tallies = evaluate(val, &self.trainer.update(), &mut |done| progress.at(done))?;
         progress.finish();
         let scores = calibrate::scored(1, &tallies);
-        eprint!("{}", calibrate::table("sigma_o", &scores));
+        crate::output::print_error(&calibrate::table("sigma_o", &scores));
         curve.validation(self.trainer.updates(), serde_json::to_value(&scores)?)?;
         Ok(scores.iter().map(|s| 2.0 - s.occupancy_iou - s.semantic_miou).sum::<f64>() / scores.len() as f64)
     }

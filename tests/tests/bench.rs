@@ -438,6 +438,6 @@ fn markdown_tells_the_figures_of_json_and_of_the_page() {
         }
     }
     let settings = table(&markdown, "made by")["settings"].clone();
-    assert!(settings.values().any(|cell| cell.contains("candidates 10, ") && cell.contains("patience 1.0")));
+    assert!(settings.values().any(|cell| cell.contains("candidates 10, ") && cell.contains("patience 1, ")));
     assert!(told.contains("candidates 10, ") && page.contains("candidates 10, "), "{told}");
 }

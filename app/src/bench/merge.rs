@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 /// Merges the shards in `parts` into a new directory, the same as if one process had run all of it; returns its plan.
 ///
 /// # Errors
-/// For shards of different plans, shards that were made otherwise unless they may be mixed, shards that overlap, are missing or unfinished (each named), and for an
-/// output directory that is there already. Nothing is written then.
+/// For shards of different plans, shards that were made otherwise (unless they may be mixed), shards that overlap, are
+/// missing or unfinished (each named), and for an output directory that is there already. Nothing is written then.
 pub fn merge(parts: &[PathBuf], out: &Path, mixing: Mixing) -> Result<Plan> {
     if fs::exists(out).map_err(|error| Error::io(out, error))? {
         return Err(Error::input(out, "", "is there already; choose a new directory to merge into"));

@@ -2,9 +2,9 @@
 
 mod table;
 
+use super::progress::Progress;
 use super::{print, to_json, warn};
 use crate::driver::belief_update;
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::episode::{EpisodeDir, EpisodeRecord};
@@ -13,10 +13,8 @@ use nudge_core::probe::{StepProbe, StepSummary, check_step, probable_steps, prob
 use nudge_core::scene::Catalog;
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// What was typed.
 ///
@@ -128,7 +126,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         tasks.push(task);
         pushes += count;
     }
-    let progress = Progress::new(pushes);
+    let progress = Progress::new("probe", pushes);
     let is_one = tasks.len() == 1 && tasks[0].steps.len() == 1;
     let mut probed = Vec::new();
     for task in &tasks {
@@ -137,13 +135,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
         let found = carry_out(task, &progress, &mut |probe| {
             if !args.json && !is_one {
-                progress.bar.suspend(|| print(&table::step(&task.record, probe)))?;
+                progress.suspend(|| print(&table::step(&task.record, probe)))?;
             }
             Ok(())
         })?;
         probed.push(found);
     }
-    progress.bar.finish_and_clear();
+    progress.finish();
     probed.iter().for_each(tell_departures);
     if let Some(file) = &args.csv {
         write_atomically(file, table::csv(&probed).as_bytes())?;
@@ -188,6 +186,9 @@ fn task(path: &Path, steps: &Steps) -> Result<(Task, usize), Error> {
         pushes += check_step(path, &record, *step)?;
     }
     let update = belief_update(Some(&record.config.belief), record.config.policy)?;
+    if let Some(words) = record.other_weights(&*update) {
+        warn(&format!("{}: {words}", path.display()));
+    }
     Ok((Task { directory, record, steps, update }, pushes))
 }
 
@@ -201,8 +202,7 @@ fn carry_out(
     let name = &task.record.scene.name;
     let catalog = Arc::new(Catalog::standard());
     let (probes, difference) =
-        probe(&task.directory, catalog, task.update.clone(), &task.steps, &|| progress.bar.inc(1), &mut |step| {
-            progress.tell(&format!("{name}, step {}", step.step));
+        probe(&task.directory, catalog, task.update.clone(), &task.steps, &|| progress.inc(), &mut |step| {
             if shown.is_ok() {
                 shown = show(step);
             }
@@ -236,33 +236,6 @@ fn tell_departures(probed: &Probed) {
                 "{path}: step {step}: {} candidates left out, for which the arm has no motion now",
                 probe.left_out
             ));
-        }
-    }
-}
-
-/// Tells how far it has come and how long it still takes: a bar on a terminal, a line per step in a log.
-struct Progress {
-    bar: ProgressBar,
-    started: Instant,
-    is_terminal: bool,
-}
-
-impl Progress {
-    fn new(pushes: usize) -> Self {
-        let is_terminal = std::io::stderr().is_terminal();
-        let target = if is_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let style =
-            ProgressStyle::with_template("{bar:24} {pos}/{len} pushes, about {eta} left").expect("a valid template");
-        let bar = ProgressBar::with_draw_target(Some(pushes as u64), target).with_style(style);
-        Self { bar, started: Instant::now(), is_terminal }
-    }
-
-    /// Tells that a step is done, if there are more.
-    fn tell(&self, what: &str) {
-        let (done, all) = (self.bar.position(), self.bar.length().unwrap_or(0));
-        if !self.is_terminal && done > 0 && done < all {
-            let left = self.started.elapsed().mul_f64((all - done) as f64 / done as f64);
-            eprintln!("{what}: {done} of {all} pushes carried out, about {} left", HumanDuration(left));
         }
     }
 }

@@ -3,10 +3,10 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> score -> episode -> learn
+//! grid -> solid -> scene -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> made_by -> score -> episode -> probe -> learn
 //! ```
 //!
-//! Beside them stand what all of them may use: [`error`], [`files`], [`rng`] and [`shard`].
+//! Beside them stand what all of them may use: [`error`], [`files`], [`places`], [`rng`] and [`shard`].
 //!
 //! One frame everywhere: x right, y into the shelf (0 at its front edge), z up (0 on the board), x = 0 in the
 //! middle of the shelf; metres, right-handed. Entropy and gain are in nats.
@@ -18,17 +18,22 @@ pub mod cnabu;
 pub mod episode;
 pub mod error;
 pub mod files;
+mod fixed;
 pub mod gain;
 pub mod grid;
 pub mod learn;
+pub mod made_by;
 mod named;
+pub mod places;
 pub mod plan;
+pub mod probe;
 pub mod push;
 pub mod rng;
 pub mod scene;
 pub mod score;
 pub mod shard;
 pub mod solid;
+pub mod wall;
 pub mod world;
 
 pub use error::{Error, Result};
@@ -50,7 +55,7 @@ mod tests {
     /// This file, whose head lists the modules.
     const SOURCE: &str = include_str!("lib.rs");
     /// What every module may use.
-    const BESIDE: [&str; 5] = ["error", "files", "named", "rng", "shard"];
+    const BESIDE: [&str; 7] = ["error", "files", "fixed", "named", "places", "rng", "shard"];
 
     fn street() -> Vec<&'static str> {
         let line = SOURCE.lines().find(|line| line.contains(" -> ")).expect("the list of modules");

@@ -16,14 +16,14 @@ pub use look::{gain_field, gain_sources};
 pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
-pub use weigh::{COARSE_VIEWS, disturbance};
+pub use weigh::{COARSE_VIEWS, disturbance, draw_pushes};
 
 use crate::arm::{ArmTool, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CNABU};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
 use crate::named;
-use crate::push::Rejection;
+use crate::push::{PushTruth, Rejection};
 use serde::{Deserialize, Serialize};
 
 /// What the robot does at one step.
@@ -45,17 +45,20 @@ pub enum Action {
 pub enum Reason {
     /// Looking tells more: `IGV > IGM + gamma Reg`.
     LookTellsMore,
-    /// Looking tells less than the best push, but that promises too little ([`PlannerSettings::push_floor`]).
+    /// The best push promises more than looking, but less than the floor ([`PlannerSettings::push_floor`]).
     PushTellsLittle,
     /// Pushing tells more: `IGV <= IGM + gamma Reg`.
     PushTellsMore,
-    /// The view that made the last push worth it.
+    /// The push really brings objects into sight: of the clairvoyant policy alone.
+    PushReveals,
+    /// Right after a push: the view for which the push was chosen.
     ViewOfPush,
     /// No push in the first steps.
     TooEarly,
     /// No push in the last step, or the last steps.
     LastStep,
-    /// No push right after a push, nor (policy `mem`) before it is closed by looks.
+    /// No push right after a push, nor (policy `mem`) before enough looks followed it
+    /// ([`PlannerSettings::closing_steps`]).
     JustPushed,
     /// The map is complete: only looks.
     MapComplete,
@@ -63,7 +66,7 @@ pub enum Reason {
     Dropped,
     /// No feasible push candidate.
     NoCandidate,
-    /// The policy's schedule or dice.
+    /// The policy's schedule or random choice.
     Schedule,
     /// Chosen by a person in the workbench, against the planner.
     Manual,
@@ -82,7 +85,7 @@ pub struct CandidateRecord {
     /// gain under the predicted belief: the best push's is exact, the others' come from fewer views and rays and are
     /// scaled to the same number of rays. Where only unseen voxels count it is what the push opens.
     pub gain: Option<f32>,
-    /// The best view after it, where it was looked for: of all candidates where it tells the gain, else of the best.
+    /// The best view after it. Where all voxels count every candidate has one, else only the best candidate.
     pub view: Option<ViewId>,
     /// `min(0, H_s(belief) - H_s(predicted))`, nats.
     pub reg: Option<f32>,
@@ -107,9 +110,10 @@ pub struct Decision {
     pub reason: Reason,
     /// Gain of the best pair of views, nats ([`Counted`] says of what).
     pub igv: f32,
-    /// Worth of the best push, nats; 0 when none was weighed.
+    /// Worth of the best push, nats; 0 when none was weighed. Of a clairvoyant policy what is unknown of the space that it
+    /// really opens, not what it promises.
     pub igm: f32,
-    /// Disturbance of the best push, nats, at most 0.
+    /// Disturbance of the best push, nats, at most 0; 0 of a clairvoyant policy.
     pub reg: f32,
     /// First and second view of the best pair.
     pub pair: Vec<ViewId>,
@@ -118,7 +122,7 @@ pub struct Decision {
     /// The push candidates, in the order drawn.
     #[serde(default)]
     pub candidates: Vec<CandidateRecord>,
-    /// Position of the best push in `candidates`.
+    /// Position of the best push in `candidates`: best by what it promises, of a clairvoyant policy by what it really does.
     #[serde(default)]
     pub best_push: Option<usize>,
     /// The arm's motion for the push that is the action, else for the best one; `None` where none was weighed.
@@ -133,7 +137,7 @@ pub struct History {
     pub actions: Vec<Action>,
     /// Views used since the last push.
     pub used_views: Vec<ViewId>,
-    /// The view that made the last push worth it, right after that push.
+    /// Right after a push: the view for which the push was chosen.
     pub view_of_push: Option<ViewId>,
     /// Best single-view gains of the look steps so far, for saturation.
     pub best_gains: Vec<f32>,
@@ -149,10 +153,10 @@ impl Decision {
 }
 
 impl History {
-    /// Takes down that `decision.action` was done, and whether it dropped an object.
+    /// Records that `decision.action` was done, and whether it dropped an object.
     ///
-    /// A look uses its view up; a push clears the used views and, unless it dropped something, leaves the view that made
-    /// it worth it for the next step.
+    /// A look uses its view up; a push clears the used views and, unless it dropped something, keeps the view for which
+    /// it was chosen for the next step.
     pub fn record(&mut self, decision: &Decision, dropped: bool) {
         self.actions.push(decision.action);
         self.dropped |= dropped;
@@ -205,6 +209,8 @@ pub struct Situation<'a> {
     pub seed: u64,
     /// The belief after really looking from a view: for the clairvoyant oracle only.
     pub really_look: &'a (dyn Fn(ViewId) -> Belief + Sync),
+    /// What pushes would really do, one answer per motion: for clairvoyant policies only.
+    pub really_push: &'a (dyn Fn(&[PushMotion]) -> Vec<PushTruth> + Sync),
 }
 
 impl Situation<'_> {
@@ -214,16 +220,17 @@ impl Situation<'_> {
     }
 }
 
-/// Which voxels a view's gain counts, and by what a push is worth it.
+/// Which voxels count as a gain, and what a push is worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Counted {
-    /// All that the view may see; a push is worth the best single view after it. As in the paper.
+    /// All voxels that the view may see, summed over its rays; a push is worth the best single view after it. As in the
+    /// paper.
     #[default]
     All,
-    /// Those that no look has seen yet, or not since a push may have changed them. What a push would make uncertain of
-    /// what was seen is no gain; it is worth what it opens to all views together ([`crate::gain::Openings`]). Each voxel
-    /// counts once: in the gain of a view ([`crate::gain::Coverage`]), in IGV and in IGM.
+    /// Only voxels that no look has seen yet, or not since a push has probably changed them. Each voxel counts once: in
+    /// the gain of a view ([`crate::gain::Coverage`]), in IGV and in IGM. A push is worth the unseen space that it
+    /// opens to all views together ([`crate::gain::Openings`]); making seen voxels uncertain is no gain.
     Unseen,
 }
 
@@ -231,8 +238,8 @@ impl Counted {
     /// Both.
     pub const ALL: [Self; 2] = [Self::All, Self::Unseen];
 
-    /// What serves a belief best, by the belief update's name: the networks stay unsure of edges however often they are
-    /// looked at, so there only unseen voxels count.
+    /// The default for a belief update, by its name: the networks stay uncertain of edges however often they are looked
+    /// at, so with them only unseen voxels count.
     pub fn of_belief(name: &str) -> Self {
         if name == CNABU { Self::Unseen } else { Self::All }
     }

@@ -1,7 +1,9 @@
 //! What a bench consists of: sets of scenes, policies, seeds, a budget, and which share of it is this shard's.
 
+use super::makers::AlsoMadeBy;
 use nudge_core::camera::NoiseModel;
 use nudge_core::files::names_in;
+use nudge_core::made_by::MadeBy;
 use nudge_core::plan::{PlannerSettings, PolicyKind};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::shard::Shard;
@@ -20,6 +22,12 @@ pub struct Plan {
     pub format: u32,
     /// Version of the program that began it.
     pub version: String,
+    /// What made its results; not there in benches of programs that did not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_by: Option<MadeBy>,
+    /// What else made some of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_made_by: Vec<AlsoMadeBy>,
     /// Number of actions of every episode.
     pub budget: usize,
     /// Seeds 0 to `seeds - 1`, for policies that draw at random; the others run once.
@@ -139,8 +147,9 @@ impl Plan {
         self.policies[policy].planner.as_ref().unwrap_or(&self.planner)
     }
 
-    /// What keeps this plan from going on with the results of `before`: the first thing that differs, in words. Where
-    /// scene files lie does not matter, and one that could not be read may have been mended.
+    /// Why this plan is not of the same episodes as `before`: the first thing that differs, in words. Where scene files lie
+    /// does not matter, and one that could not be read may have been mended. Whether what made their results is the same is
+    /// another question: [`Plan::join`].
     pub fn difference(&self, before: &Self) -> Option<String> {
         let policies = |plan: &Self| {
             let name = |p: &PolicyPlan| format!("{} on the {} belief", p.policy, p.belief);
@@ -148,8 +157,7 @@ impl Plan {
         };
         let shard = |plan: &Self| plan.shard.map_or("no shard".to_owned(), |shard| format!("shard {shard}"));
         let noise = |plan: &Self| NoiseModel::name_of(plan.noise);
-        let settings: [(&str, String, String); 7] = [
-            ("version", before.version.clone(), self.version.clone()),
+        let settings: [(&str, String, String); 6] = [
             ("budget", before.budget.to_string(), self.budget.to_string()),
             ("number of seeds", before.seeds.to_string(), self.seeds.to_string()),
             ("view array", before.views.clone(), self.views.clone()),
@@ -161,7 +169,18 @@ impl Plan {
         if let Some((what, before, now)) = differs {
             return Some(format!("the {what} was {before}, now it is {now}"));
         }
-        self.planner_difference(before).or_else(|| self.scene_difference(before))
+        self.untold_difference(before).or_else(|| self.scene_difference(before))
+    }
+
+    /// What differs of that which `made_by` tells, where neither has one.
+    fn untold_difference(&self, before: &Self) -> Option<String> {
+        if self.made_by.is_some() || before.made_by.is_some() {
+            return None;
+        }
+        if self.version != before.version {
+            return Some(format!("the version was {}, now it is {}", before.version, self.version));
+        }
+        self.planner_difference(before)
     }
 
     /// The first of the planner's numbers that differs, by its option, and of which policy if not of all.
@@ -259,10 +278,10 @@ fn scene_files(path: &Path) -> Result<(String, Vec<PathBuf>)> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn plan(shard: Option<Shard>) -> Plan {
+    pub(in crate::bench) fn plan(shard: Option<Shard>) -> Plan {
         let scene = |id: &str| ScenePlan {
             id: id.to_owned(),
             file: format!("{id}.toml"),
@@ -279,6 +298,8 @@ mod tests {
         Plan {
             format: FORMAT,
             version: "1".to_owned(),
+            made_by: None,
+            also_made_by: Vec::new(),
             budget: 20,
             seeds: 3,
             views: "standard300".to_owned(),

@@ -168,7 +168,7 @@ pub fn run_episode(
     recording: Option<&Path>,
 ) -> Result<(Episode, Vec<(usize, Tally)>)> {
     let PolicyPlan { policy, belief, .. } = &plan.policies[id.policy];
-    let (update, _) = belief_update(Some(belief), *policy)?;
+    let update = belief_update(Some(belief), *policy)?;
     let config = EpisodeConfig {
         policy: *policy,
         belief: belief.clone(),

@@ -74,6 +74,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             planner: args.planner.0.clone(),
         },
         out: args.out.clone(),
+        shipped_scenes: nudge_core::places::SCENES.find().map(|found| found.path),
         remember: args.picture.is_none(),
         script: args.picture.clone().map(|picture| crate::workbench::app::Script { steps: args.steps, picture }),
         serve: args.serve,

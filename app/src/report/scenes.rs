@@ -16,7 +16,7 @@ const SHOWN: usize = 3;
 /// Width of a picture, pixels.
 const WIDTH: u32 = 360;
 
-/// What a set holds that no view shows, and how well a map can be that lacks it.
+/// What a set holds that no view shows, and how well a map can be that lacks it, in words.
 pub fn without_hidden(results: &Results, set: usize, catalog: &Catalog) -> Result<String> {
     let scenes = &results.plan.sets[set].scenes;
     let (mut hidden, mut iou, mut miou) = (Vec::new(), Vec::new(), Vec::new());
@@ -30,8 +30,8 @@ pub fn without_hidden(results: &Results, set: usize, catalog: &Catalog) -> Resul
         miou.push(Metric::SemanticMiou.of(&scores));
     }
     Ok(format!(
-        "<p>At the start no view shows {:.1} objects of a scene. A perfect map that lacks them has occupancy IoU {:.3} and \
-         semantic mIoU {:.3} (means over {} scenes): what is beyond that has to be pushed free, or guessed.</p>\n",
+        "At the start no view shows {:.1} objects of a scene. A perfect map that lacks them has occupancy IoU {:.3} and \
+         semantic mIoU {:.3} (means over {} scenes): what is beyond that has to be pushed free, or guessed.",
         mean(&hidden),
         mean(&iou),
         mean(&miou),

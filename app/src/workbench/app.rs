@@ -41,8 +41,10 @@ pub struct Options {
     pub form: FormOptions,
     /// The folder that new episodes go to.
     pub out: PathBuf,
-    /// The folder of the scenes to choose from.
+    /// The folder of the scenes to choose from, and where new ones go.
     pub scenes: PathBuf,
+    /// The folder of the scenes that came with the program, to choose from as well.
+    pub shipped_scenes: Option<PathBuf>,
     /// Whether choices outlast the program.
     pub remember: bool,
     /// Light instead of dark; what is remembered otherwise.
@@ -92,6 +94,7 @@ impl Default for Options {
             form: FormOptions::default(),
             out: PathBuf::from("out"),
             scenes: PathBuf::from(super::browser::FOLDER),
+            shipped_scenes: None,
             remember: false,
             light: None,
             layout: None,
@@ -288,7 +291,10 @@ impl App {
         let repaint = ctx.clone();
         let wake: Wake = Arc::new(move || repaint.request_repaint());
         Self {
-            model: Model { browser: Browser::of(&options.scenes), ..Model::default() },
+            model: Model {
+                browser: Browser::of(&options.scenes).and_shipped(options.shipped_scenes.clone()),
+                ..Model::default()
+            },
             options,
             catalog: Arc::new(Catalog::standard()),
             workers: BTreeMap::new(),

@@ -7,7 +7,7 @@ pub const PUSH_EVERY: usize = 5;
 
 /// The rule: look if `max(IGV, floor) > IGM + gamma Reg`, else push. The paper's rule has no floor: 0.
 ///
-/// `reg` is at most 0, so a push that blurs what is known of the labels has to promise more.
+/// `reg` is at most 0, so a push that makes labels less certain has to promise more.
 pub fn look_or_push(igv: f32, floor: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
     match igm + gamma * reg {
         push if igv > push => Reason::LookTellsMore,
@@ -16,8 +16,8 @@ pub fn look_or_push(igv: f32, floor: f32, igm: f32, reg: f32, gamma: f32) -> Rea
     }
 }
 
-/// Why no push is allowed in the next step of `budget`, or `None` if one is. Of several reasons the lasting ones are named
-/// first.
+/// Why no push is allowed in the next step of `budget`, or `None` if one is. Of several reasons, those that last are
+/// named first.
 pub fn push_guard(history: &History, budget: usize, map_complete: bool, settings: &PlannerSettings) -> Option<Reason> {
     let step = history.actions.len();
     let guards = [
@@ -30,8 +30,8 @@ pub fn push_guard(history: &History, budget: usize, map_complete: bool, settings
     guards.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
 }
 
-/// Whether the last push is not closed yet: fewer than [`PlannerSettings::closing_steps`] looks followed it, so that what it
-/// disturbed is not made good and what it opened not seen.
+/// Whether the last push still needs looks: fewer than [`PlannerSettings::closing_steps`] followed it, so the map does
+/// not yet show what it moved and what it opened.
 pub fn still_closing(history: &History, settings: &PlannerSettings) -> bool {
     history.looks_since_push().is_some_and(|looks| looks < settings.closing_steps)
 }

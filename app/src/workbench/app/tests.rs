@@ -170,9 +170,30 @@ fn panels_stay_as_wide_as_they_were_made() {
 fn an_episode_of_the_networks_opens_in_a_build_without_them() {
     let folder = tempfile::tempdir().expect("folder");
     let mut harness = window(folder.path(), 1);
-    reopened(&mut harness, |record| record["belief"] = "cnabu".into());
+    reopened(&mut harness, |record| {
+        record["belief"] = "cnabu".into();
+        // As programs wrote it that did not tell what made an episode.
+        record.as_object_mut().expect("an object").remove("made_by");
+    });
     let session = harness.state().model.session().expect("shown all the same");
     let reason = session.read_only.as_deref().expect("to look at only");
     assert!(reason.contains("shown is what it holds"), "{reason}");
     assert_eq!((session.steps(), session.setup.update.is_some()), (1, nudge_core::cnabu::AVAILABLE));
+}
+
+#[test]
+fn an_episode_of_other_weights_opens_to_be_looked_at_and_says_so() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 2);
+    reopened(&mut harness, |record| {
+        record["belief"] = "cnabu".into();
+        record["made_by"]["weights"] = serde_json::json!({ "sigma_o": "0".repeat(64), "sigma_m": "1".repeat(64) });
+    });
+    let session = harness.state().model.session().expect("shown all the same");
+    let reason = session.read_only.as_deref().expect("to look at only");
+    assert!(reason.contains("shown is what it holds") && reason.lines().count() == 1, "{reason}");
+    let is_told = reason.contains("the weights sigma_o were 000000000000, now they are ");
+    assert_eq!(is_told, nudge_core::cnabu::AVAILABLE, "{reason}");
+    // Nothing is repeated with weights that it was not made with, and no push predicted.
+    assert!(session.steps() == 2 && session.setup.update.is_none());
 }

@@ -6,7 +6,7 @@
 //! grid -> solid -> scene -> arm -> world -> camera -> belief -> cnabu -> gain -> push -> plan -> made_by -> score -> episode -> probe -> learn
 //! ```
 //!
-//! Beside them stand what all of them may use: [`error`], [`files`], [`places`], [`rng`] and [`shard`].
+//! Beside them stand what all of them may use: [`error`], [`files`], [`places`], [`rng`], [`shard`] and [`wall`].
 //!
 //! One frame everywhere: x right, y into the shelf (0 at its front edge), z up (0 on the board), x = 0 in the
 //! middle of the shelf; metres, right-handed. Entropy and gain are in nats.
@@ -55,7 +55,7 @@ mod tests {
     /// This file, whose head lists the modules.
     const SOURCE: &str = include_str!("lib.rs");
     /// What every module may use.
-    const BESIDE: [&str; 7] = ["error", "files", "fixed", "named", "places", "rng", "shard"];
+    const BESIDE: [&str; 8] = ["error", "files", "fixed", "named", "places", "rng", "shard", "wall"];
 
     fn street() -> Vec<&'static str> {
         let line = SOURCE.lines().find(|line| line.contains(" -> ")).expect("the list of modules");

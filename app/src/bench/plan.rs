@@ -172,10 +172,11 @@ impl Plan {
         self.untold_difference(before).or_else(|| self.scene_difference(before))
     }
 
-    /// What differs of that which `made_by` tells, where neither has one.
+    /// What differs of that which `made_by` tells, where neither has one; and of a policy's own numbers, of which it never
+    /// tells.
     fn untold_difference(&self, before: &Self) -> Option<String> {
         if self.made_by.is_some() || before.made_by.is_some() {
-            return None;
+            return (self.planner == before.planner).then(|| self.planner_difference(before)).flatten();
         }
         if self.version != before.version {
             return Some(format!("the version was {}, now it is {}", before.version, self.version));
@@ -345,6 +346,13 @@ pub(super) mod tests {
         let mut own = before.clone();
         own.policies[1].planner = Some(PlannerSettings { gamma: 0.5, ..before.planner });
         assert_eq!(own.difference(&before).as_deref(), Some("--gamma of oracle was 0.2, now it is 0.5"));
+        let told = |plan: &Plan| Plan {
+            made_by: Some(MadeBy::new(Default::default(), None, plan.planner, 1)),
+            ..plan.clone()
+        };
+        let words = told(&own).difference(&told(&before));
+        assert_eq!(words.as_deref(), Some("--gamma of oracle was 0.2, now it is 0.5"), "no maker tells of it");
+        assert_eq!(told(&eager).difference(&told(&before)), None, "makers tell of it: `join`");
         let noisy = Plan { noise: Some(NoiseModel::STANDARD), ..before.clone() };
         assert_eq!(noisy.difference(&before).as_deref(), Some("the noise was none, now it is standard"));
         let mut fewer = before.clone();

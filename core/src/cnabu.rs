@@ -3,8 +3,8 @@
 //! Both are residual U-Nets over the floor plan whose channels are the heights; they give evidence, a Beta per voxel and a
 //! Dirichlet per floor cell, and are trained with evidential losses on our own simulated data ([`crate::learn`]).
 //!
-//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has this module's
-//! door only: [`AVAILABLE`] is false, and [`load`] says so.
+//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has only
+//! [`AVAILABLE`], which is false, and [`load`], which returns an error.
 
 #[cfg(feature = "cnabu")]
 mod layout;
@@ -55,7 +55,7 @@ use crate::{Result, places};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// File name of sigma_m's weights; without it pushes are predicted classically.
+/// File name of sigma_m's weights; its card is beside it, with `.toml`.
 pub const PUSH_WEIGHTS: &str = "sigma_m.safetensors";
 /// Whether this build can run the networks.
 pub const AVAILABLE: bool = cfg!(feature = "cnabu");
@@ -69,7 +69,7 @@ pub fn models_dir() -> Option<PathBuf> {
     places::MODELS.find().map(|found| found.path)
 }
 
-/// What [`choose_device`] was told.
+/// The device that [`choose_device`] chose.
 static CHOSEN: OnceLock<String> = OnceLock::new();
 
 /// Chooses the device that weights are loaded onto, before [`DEVICE_ENV`]; the first choice holds.
@@ -121,6 +121,13 @@ pub fn set_threads(threads: usize) {
     tch::set_num_threads(threads.clamp(1, 1024) as i32);
 }
 
+/// Has libtorch compute on the thread that asks, as rayon's threads share the work; once, before weights are loaded.
+/// (Training has libtorch's own threads: [`set_threads`].)
+pub fn compute_beside_rayon() {
+    #[cfg(feature = "cnabu")]
+    set_threads(1);
+}
+
 /// The device of a name: `cpu`, `cuda`, or `auto` for CUDA when libtorch has it.
 ///
 /// # Errors
@@ -151,11 +158,29 @@ pub fn load(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
     Ok(Arc::new(Cnabu::load(directory)?))
 }
 
+/// sigma_o alone with its weights in `directory`, to score observations.
+///
+/// # Errors
+/// As [`load`].
+#[cfg(feature = "cnabu")]
+pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    Ok(Arc::new(Cnabu::load_observation(directory)?))
+}
+
+/// sigma_o alone: not in this build.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "cnabu"))]
+pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    load(directory)
+}
+
 /// The networks with the weights in `directory`: not in this build.
 ///
 /// # Errors
 /// Always.
 #[cfg(not(feature = "cnabu"))]
 pub fn load(_directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
-    Err(crate::Error::Usage("this build has no networks; build it with --features cnabu (make cnabu)".to_owned()))
+    Err(crate::Error::Usage("this program was built without networks".to_owned()))
 }

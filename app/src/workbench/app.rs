@@ -8,7 +8,7 @@ mod take_in;
 mod tests;
 
 use super::browser::Browser;
-use super::command::Command;
+use super::command::{Command, Level};
 use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};
@@ -19,7 +19,8 @@ use super::tasks::Tasks;
 use super::threads::Threads;
 use super::viewer::Viewer;
 use super::worker::{Event, Worker};
-use nudge_core::camera::ViewId;
+use crate::planner_args::PlannerArgs;
+use nudge_core::camera::{NoiseModel, ViewId};
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
 use re_viewer::external::{eframe, egui};
@@ -69,6 +70,12 @@ pub struct FormOptions {
     pub budget: Option<usize>,
     /// Seed of every random choice.
     pub seed: Option<u64>,
+    /// The view array.
+    pub views: Option<String>,
+    /// What the camera gets wrong, `Some(None)` for nothing.
+    pub noise: Option<Option<NoiseModel>>,
+    /// The planner's settings.
+    pub planner: PlannerArgs,
 }
 
 /// Something to do before the program ends by itself.
@@ -334,6 +341,14 @@ impl App {
         form.policy = chosen.policy.unwrap_or(form.policy);
         form.budget = chosen.budget.unwrap_or(form.budget);
         form.seed = chosen.seed.unwrap_or(form.seed);
+        form.noise = chosen.noise.unwrap_or(form.noise);
+        if let Some(views) = &chosen.views {
+            form.views.clone_from(views);
+        }
+        match chosen.planner.onto(form.planner) {
+            Ok(planner) => form.planner = planner,
+            Err(error) => self.model.toasts.tell(Level::Error, error.to_string()),
+        }
         self.model.author.wake_with(self.wake.clone());
         if let Some(path) = self.options.open.clone() {
             if self.options.layout.is_none() && self.model.kept.layout == LayoutKind::Author {

@@ -8,7 +8,9 @@ use crate::workbench::model::{LayoutKind, Model};
 use crate::workbench::session::Session;
 use egui_plot::{AxisHints, GridMark, Line, LineStyle, MarkerShape, Plot, PlotPoint, Points, VLine};
 use nudge_core::plan::Action;
-use re_viewer::external::egui::{Color32, CursorIcon, Rangef, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
+use re_viewer::external::egui::{
+    Color32, CursorIcon, Rangef, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2,
+};
 
 /// The scores between 0 and 1 that are drawn.
 const SHARES: [&str; 3] = ["occupancy_iou", "occupied_iou", "semantic_miou"];

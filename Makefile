@@ -9,7 +9,7 @@ CARGO := LIBTORCH="$$(scripts/libtorch.sh)" cargo
 WINDOW := --features nudge-tests/workbench
 CORE := -p nudge-core -p nudge-unify
 DATA := $(CURDIR)/out/data
-DEMO := scenes/demo/behind-the-boxes.toml
+DEMO := scenes/high/can-phalanx.toml
 
 .PHONY: help setup graphics python networks headless demo workbench workbench-build train train-push \
 	test test-core test-headless test-window regress bench bench-window lint lint-classical once install uninstall
@@ -40,7 +40,7 @@ headless: networks
 	$(CARGO) build --release --locked --workspace
 
 demo: headless
-	$(NUDGE) run $(DEMO) --policy mem --beside mem-no-push --budget 20 --seed 0 --out out/demo --force
+	$(NUDGE) run $(DEMO) --policy mem --beside mem-no-push --budget 16 --seed 0 --out out/demo --force
 
 workbench-build: graphics networks
 	$(CARGO) build --release --locked --workspace $(WINDOW)

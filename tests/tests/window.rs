@@ -9,22 +9,33 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 const SCENE: &str = "scenes/demo/behind-the-boxes.toml";
+/// The crowded shelf of `make demo`: pushes bring hidden cans into sight.
+const DEMO: &str = "scenes/high/can-phalanx.toml";
 /// Share of a picture's pixels that may look other than they did.
 const TOLERANCE: f64 = 0.02;
 /// How much a colour may differ, of 255, before its pixel looks other.
 const FAINT: u8 = 24;
 
-/// Episodes of two policies to look at, made once for all tests of this process.
+/// The demo's shelf, mapped with pushes and without, made once for all tests of this process.
 static EPISODES: LazyLock<(tempfile::TempDir, [PathBuf; 2])> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("folder");
-    let episodes = ["random-push-5", "random"].map(|policy| {
-        let out = folder.path().join(policy);
-        let path = out.to_str().expect("utf-8");
-        let args = ["run", SCENE, "--belief", "classical", "--budget", "10", "--seed", "1", "--candidates", "30"];
-        nudge_ok(&[&args[..], &["--policy", policy, "--out", path]].concat());
-        out
-    });
-    (folder, episodes)
+    let out = folder.path().join("demo");
+    let path = out.to_str().expect("utf-8");
+    nudge_ok(&[
+        "run",
+        DEMO,
+        "--policy",
+        "mem",
+        "--beside",
+        "mem-no-push",
+        "--budget",
+        "12",
+        "--seed",
+        "0",
+        "--out",
+        path,
+    ]);
+    (folder, [out.clone(), out.with_file_name("demo-mem-no-push")])
 });
 
 /// A socket of the internet's protocols that a process holds.

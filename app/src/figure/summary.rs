@@ -323,7 +323,7 @@ fn plots(svg: &mut Svg, summary: &Summary<'_>, top: f32) {
     let steps = summary.beside.map_or(0, |other| other.steps.len()).max(record.steps.len());
     // The episode itself, and the one beside it: the same colour, paler and dashed.
     let curves = |name: &str, rgb: Rgb, value: &dyn Fn(&Scores) -> f64| -> Vec<Curve> {
-        let own = if name.is_empty() && beside.is_some() { record.config.policy.name() } else { name };
+        let own = if beside.is_some() { record.config.policy.name() } else { name };
         let mine = Curve { name: own.to_owned(), rgb, dash: [0.0; 2], values: scores.iter().map(value).collect() };
         let other = beside.as_ref().map(|(policy, scores)| Curve {
             name: (*policy).to_owned(),

@@ -11,7 +11,10 @@ mod tests;
 pub use folders::Folder;
 pub use libtorch::{Libtorch, WANTED};
 
+use crate::made_by;
 use nudge_core::cnabu;
+use nudge_core::files::sha256_of_file;
+use nudge_core::made_by::Build;
 use nudge_core::places::{Found, MODELS, SCENES, Shipped};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -21,6 +24,10 @@ use std::path::PathBuf;
 pub struct Diagnosis {
     /// The program's version.
     pub version: &'static str,
+    /// The git commit that it was built from, or `unknown`.
+    pub commit: String,
+    /// Whether what went into it differed from that commit; `null` where there is none.
+    pub dirty: Option<bool>,
     /// The program's file.
     pub program: Option<PathBuf>,
     /// Whether this build has the networks.
@@ -73,6 +80,8 @@ pub struct WeightFile {
     pub file: &'static str,
     /// Its size; `null` if it is not there.
     pub bytes: Option<u64>,
+    /// Its SHA-256; `null` if it cannot be read.
+    pub sha256: Option<String>,
 }
 
 /// Numbers of threads.
@@ -132,8 +141,11 @@ impl Diagnosis {
         let graphics = graphics(&mut problems);
         let folders = folders::all();
         problems.extend(folders.iter().flat_map(Folder::problems));
+        let Build { commit, dirty } = made_by::build();
         Self {
             version: nudge_core::VERSION,
+            commit,
+            dirty,
             program: std::env::current_exe().ok(),
             networks: cnabu::AVAILABLE,
             window: cfg!(feature = "workbench"),
@@ -170,7 +182,11 @@ fn weights(found: Option<Found>, has_device: bool, problems: &mut Vec<Problem>) 
     let Some(folder) = place.folder.clone().filter(|folder| folder.is_dir()) else {
         return Weights { place, ..Weights::default() };
     };
-    let file = |file| WeightFile { file, bytes: folder.join(file).metadata().ok().map(|data| data.len()) };
+    let file = |file| {
+        let path = folder.join(file);
+        let bytes = path.metadata().ok().map(|data| data.len());
+        WeightFile { file, bytes, sha256: sha256_of_file(&path).ok() }
+    };
     let files = [cnabu::OBSERVE_WEIGHTS, cnabu::PUSH_WEIGHTS].map(file).to_vec();
     let loaded = has_device.then(|| cnabu::load(&folder));
     if let Some(Err(error)) = &loaded {

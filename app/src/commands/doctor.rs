@@ -29,7 +29,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 /// Everything on lines of its own, then what is wrong with what to do.
 fn table(found: &Diagnosis) -> String {
-    let mut text = format!("nudge {}", found.version);
+    let changed = if found.dirty == Some(true) { ", changed since" } else { "" };
+    let mut text = format!("nudge {} (commit {}{changed})", found.version, found.commit);
     // Writing into a string cannot fail.
     if let Some(program) = &found.program {
         let _ = write!(text, ", {}", program.display());
@@ -44,7 +45,8 @@ fn table(found: &Diagnosis) -> String {
     line("weights", &place(&found.weights.place));
     for file in &found.weights.files {
         let bytes = file.bytes.map_or("not there".to_owned(), megabytes);
-        line("", &format!("{}  {bytes}", file.file));
+        let hash = file.sha256.as_ref().map_or(String::new(), |hash| format!(", SHA-256 {hash}"));
+        line("", &format!("{}  {bytes}{hash}", file.file));
     }
     match found.weights.load {
         Some(true) => line("", "they load"),

@@ -54,7 +54,9 @@ fn weights_that_are_not_there_and_weights_that_are_none_are_problems() {
     std::fs::write(folder.path().join(cnabu::OBSERVE_WEIGHTS), b"no weights").expect("written");
     let broken = weights(found(folder.path()), true, &mut problems);
     assert_eq!(broken.files[0].bytes, Some(10));
-    assert_eq!(broken.files[1].bytes, None);
+    let hash = nudge_core::files::sha256(b"no weights");
+    assert_eq!(broken.files[0].sha256, Some(hash));
+    assert_eq!((broken.files[1].bytes, &broken.files[1].sha256), (None, &None));
     assert_eq!(broken.load, Some(false));
     assert!(!cnabu::AVAILABLE || problems[0].what.contains(cnabu::OBSERVE_WEIGHTS), "{problems:?}");
     assert_eq!(weights(found(folder.path()), false, &mut Vec::new()).load, None);

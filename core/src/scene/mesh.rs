@@ -112,7 +112,7 @@ pub fn load_mesh(
     })?;
     if unit.is_none() && file_unit != Unit::Metre {
         warnings.push(format!(
-            "not in metres: the largest edge of {} was read as {} ({:.3} m); say which unit it is if that is wrong",
+            "not in metres: the largest edge of {} was read as {} ({:.3} m); --unit, or `unit` in a scene, says otherwise",
             (edge * 1e5).round() / 1e5,
             file_unit.name(),
             edge * file_unit.metres()

@@ -5,6 +5,7 @@
 //! calls leaves a directory that [`Driver::resume`] goes on with.
 
 use crate::figure::{Moment, Summary, summary};
+use crate::made_by;
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical};
@@ -90,6 +91,7 @@ impl Driver {
         overwrite: Overwrite,
     ) -> Result<Self> {
         let mut episode = Episode::new(scene, catalog, config, update)?;
+        episode.built_from(made_by::build());
         let mut directory = EpisodeDir::create(out, overwrite)?;
         let mut recorder = Recorder::create(&out.join(RECORDING), &episode)?;
         recorder.prior(&episode)?;
@@ -125,7 +127,8 @@ impl Driver {
         if resumed.is_err() && begun.is_some() {
             let _ = remove_if_there(&anew);
         }
-        let (directory, episode) = resumed?;
+        let (directory, mut episode) = resumed?;
+        episode.built_from(made_by::build());
         let (mut recorder, story) = begun.ok_or_else(|| Error::input(out, "", "holds no prior to go on from"))?;
         recorder.move_to(&out.join(RECORDING))?;
         Ok(Self { episode, directory, recorder, story })

@@ -239,7 +239,7 @@ impl Golden {
         let mut policies = Vec::new();
         for policy in &self.policies {
             let update = belief_update(Some(&self.belief), *policy)?;
-            policies.push(PolicyPlan { policy: *policy, belief: update.name().to_owned() });
+            policies.push(PolicyPlan { policy: *policy, belief: update.name().to_owned(), planner: None });
         }
         Ok(Plan {
             format: BENCH_FORMAT,
@@ -248,10 +248,13 @@ impl Golden {
             seeds: 1,
             views: "standard300".to_owned(),
             planner: PlannerSettings::default().counting(Counted::of_belief(&self.belief)),
+            noise: None,
             policies,
             sets: vec![SetPlan { name: "regress".to_owned(), scenes }],
             broken: Vec::new(),
             shard: None,
+            made_by: None,
+            also_made_by: Vec::new(),
         })
     }
 }

@@ -15,6 +15,7 @@ mod closed_form;
 mod cover;
 mod description;
 mod distance;
+mod ends;
 mod hand;
 mod joints;
 mod line;

@@ -7,6 +7,7 @@
 mod carried;
 mod classical;
 mod floor;
+mod networks;
 mod sightings;
 
 #[cfg(feature = "cnabu")]
@@ -14,6 +15,7 @@ pub(crate) use carried::Carried;
 pub(crate) use carried::SOLID;
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
+pub use networks::{NetworksUsed, Weights, short};
 pub use sightings::{CHANGED, LOOKS_TAKEN, NEWS_REACH_M, Sightings, look};
 
 use crate::arm::{Arm, Push};
@@ -237,6 +239,11 @@ pub trait BeliefUpdate: Send + Sync {
     /// where a look changes them.
     fn wears(&self) -> bool {
         false
+    }
+
+    /// The networks that it runs on; `None` for an update without any.
+    fn networks_used(&self) -> Option<NetworksUsed> {
+        None
     }
 
     /// The belief after an observation: `lambda' = sigma_o(lambda, o)`. Episodes go through [`look`].

@@ -50,8 +50,8 @@ pub(crate) use update::{belief_of, observation_planes};
 #[cfg(feature = "cnabu")]
 pub use weights::{Card, UPDATES, card_path, load_network, read_tensors, write_tensors};
 
-use crate::Result;
 use crate::belief::BeliefUpdate;
+use crate::{Result, places};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -61,22 +61,12 @@ pub const PUSH_WEIGHTS: &str = "sigma_m.safetensors";
 pub const AVAILABLE: bool = cfg!(feature = "cnabu");
 /// File name of sigma_o's weights in a models directory; its card is beside it, with `.toml`.
 pub const OBSERVE_WEIGHTS: &str = "sigma_o.safetensors";
-/// Names the directory of weights, before any other place.
-pub const MODELS_ENV: &str = "NUDGE_MODELS";
-
 /// The device that weights are loaded onto: `cpu`, `cuda`, or `auto`.
 pub const DEVICE_ENV: &str = "NUDGE_DEVICE";
 
-/// The directory of weights: [`MODELS_ENV`] if it is set, else the first `models` with weights in it beside or above the
-/// program, in the working directory, or in the source tree that it was built from.
+/// The directory of weights, where [`places`] finds it.
 pub fn models_dir() -> Option<PathBuf> {
-    if let Some(directory) = std::env::var_os(MODELS_ENV) {
-        return Some(directory.into());
-    }
-    let program = std::env::current_exe().ok();
-    let beside = program.iter().flat_map(|path| path.ancestors().skip(1)).map(|above| above.join("models"));
-    let rest = [PathBuf::from("models"), Path::new(env!("CARGO_MANIFEST_DIR")).join("../models")];
-    beside.chain(rest).find(|directory| directory.join(OBSERVE_WEIGHTS).is_file())
+    places::MODELS.find().map(|found| found.path)
 }
 
 /// The device that [`choose_device`] chose.
@@ -110,7 +100,22 @@ fn chosen_device() -> Result<Device> {
     device(named.as_deref().unwrap_or("auto"))
 }
 
+/// The name of the device that weights are loaded onto: `cpu` or `cuda`.
+///
+/// # Errors
+/// As [`device`], for what [`choose_device`] or [`DEVICE_ENV`] named.
+#[cfg(feature = "cnabu")]
+pub fn device_name() -> Result<&'static str> {
+    Ok(if chosen_device()?.is_cuda() { "cuda" } else { "cpu" })
+}
+
 /// Number of threads that libtorch computes with.
+#[cfg(feature = "cnabu")]
+pub fn threads() -> usize {
+    tch::get_num_threads().try_into().unwrap_or(0)
+}
+
+/// Sets the number of threads that libtorch computes with.
 #[cfg(feature = "cnabu")]
 pub fn set_threads(threads: usize) {
     tch::set_num_threads(threads.clamp(1, 1024) as i32);

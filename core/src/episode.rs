@@ -20,7 +20,9 @@ mod synthetic;
 pub use directory::{DirectoryState, EpisodeDir, Overwrite};
 pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
-pub use record::{EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds};
+pub use record::{
+    EpisodeConfig, EpisodeRecord, FORMAT, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
+};
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
 pub(crate) use resume::revisit;
 pub use resume::{Observer, resume, review};

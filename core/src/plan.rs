@@ -1,33 +1,30 @@
 //! The planner: look or push?
 //!
 //! Look (first view of IGV) if `IGV > IGM + gamma Reg`, else push; `Reg = min(0, H_s(belief) - H_s(predicted))` over the
-//! semantic map and `gamma = 1/5`. A [`Decision`] keeps everything that was weighed.
+//! semantic map and `gamma` is [`GAMMA`] unless a user says otherwise ([`SETTINGS`]). A [`Decision`] keeps everything that was
+//! weighed.
 
 mod decide;
 mod look;
 mod policy;
 mod rule;
+mod settings;
 mod weigh;
 
 pub use decide::decide;
 pub use look::{gain_field, gain_sources};
 pub use policy::PolicyKind;
-pub use rule::{
-    CLOSING_STEPS, PATIENCE, PUSH_EVERY, PUSH_FLOOR, QUIET_STEPS, RESTORING_STEPS, SATURATION, look_or_push,
-    push_guard, saturated, still_closing,
-};
+pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
+pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
 pub use weigh::{COARSE_VIEWS, disturbance, draw_pushes};
 
 use crate::arm::{ArmTool, Push, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, CERTAIN, CNABU, COMPLETE_SHARE};
+use crate::belief::{Belief, BeliefUpdate, CNABU};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
 use crate::named;
-use crate::push::{PushSampler, PushTruth, Rejection};
+use crate::push::{PushTruth, Rejection};
 use serde::{Deserialize, Serialize};
-
-/// Weight of the disturbance term.
-pub const GAMMA: f32 = 0.2;
 
 /// What the robot does at one step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -278,72 +275,6 @@ impl std::str::FromStr for Counted {
 
     fn from_str(text: &str) -> Result<Self, String> {
         named::parse(&Self::ALL, text)
-    }
-}
-
-/// Numbers of the planner that a user may change.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct PlannerSettings {
-    /// Which voxels count as a gain.
-    pub counted: Counted,
-    /// Push candidates drawn per decision.
-    pub candidates: usize,
-    /// Where they are drawn. Pushes of policies that push at random come from the frontier all the same.
-    pub push_sampler: PushSampler,
-    /// Weight of the disturbance term.
-    pub gamma: f32,
-    /// A push has to promise this many times what looking does: look if `patience IGV > IGM + gamma Reg`.
-    pub patience: f32,
-    /// A push has to promise at least this, nats: it also costs, in things that were found and are lost again and in looks
-    /// that make good what it disturbs. Look if `max(patience IGV, push_floor) > IGM + gamma Reg`.
-    pub push_floor: f32,
-    /// A floor cell whose likeliest class is more probable than this is certain.
-    pub certain: f32,
-    /// The map is complete, and nothing is pushed any more, once this share of the floor cells is certain.
-    pub complete: f32,
-    /// The first steps, in which nothing is pushed.
-    pub quiet_steps: usize,
-    /// Looks that close a push, making good what it disturbs and seeing what it opens: none is made in the last so many
-    /// steps, and `mem` makes none before so many looks followed the one before.
-    pub closing_steps: usize,
-    /// The policy `saturation` pushes once two consecutive best gains differ by less than this share.
-    pub saturation: f32,
-}
-
-impl Default for PlannerSettings {
-    fn default() -> Self {
-        Self {
-            counted: Counted::default(),
-            candidates: 80,
-            push_sampler: PushSampler::default(),
-            gamma: GAMMA,
-            patience: 1.0,
-            push_floor: 0.0,
-            certain: CERTAIN,
-            complete: COMPLETE_SHARE,
-            quiet_steps: QUIET_STEPS,
-            closing_steps: CLOSING_STEPS,
-            saturation: SATURATION,
-        }
-    }
-}
-
-impl PlannerSettings {
-    /// These settings with what goes with a way to count: the paper's rule where all voxels count. Where only unseen ones
-    /// do, a push has to promise [`PATIENCE`] times what looking does, and at least [`PUSH_FLOOR`]; and
-    /// [`RESTORING_STEPS`] looks close it: a push takes about that many to pay off.
-    pub fn counting(self, counted: Counted) -> Self {
-        let (patience, push_floor, closing_steps) = match counted {
-            Counted::All => (1.0, 0.0, CLOSING_STEPS),
-            Counted::Unseen => (PATIENCE, PUSH_FLOOR, RESTORING_STEPS),
-        };
-        Self { counted, patience, push_floor, closing_steps, ..self }
-    }
-
-    /// What `IGM + gamma Reg` of a push has to reach where looking promises `igv`, nats.
-    pub fn asked_of_pushes(&self, igv: f32) -> f32 {
-        (self.patience * igv).max(self.push_floor)
     }
 }
 

@@ -4,8 +4,8 @@
 //! tool's height [`TOOL_HEIGHT_M`] above the board, and are 50 to 150 mm long. A candidate is feasible if the arm has a motion
 //! for it that touches neither the shelf nor what is believed to stand there, the target apart; see [`ArmClearance`].
 //!
-//! * From the frontier, as in the paper: the frontier is the first surely occupied voxel ([`CONFIDENT`]) seen from the shelf's
-//!   entrance in each (x, z) column. A push starts before a random point of it and goes towards a random likely occupied voxel
+//! * From the frontier, as in the paper (which leaves distances and probabilities open): that is the first surely occupied
+//!   voxel ([`CONFIDENT`]) seen from the shelf's entrance in each (x, z) column. A push starts before a random point of it and goes towards a random likely occupied voxel
 //!   within [`REACH_M`] of the point, never back towards the entrance.
 //! * Before hidden space: a contact may be at the front or a side of what surely stands at the tool's height. A contact
 //!   is the more likely the more unseen space lies behind it. Its direction is random among those that leave room for

@@ -155,6 +155,12 @@ fn what_is_run_without_a_word_runs_on_the_networks() {
     let said = nudge_ok(&["run", "scenes/demo/first-look.toml", "--budget", "1", "--json", "--out", utf8(&out)]);
     let record: Value = serde_json::from_str(&said).expect("JSON");
     assert_eq!((&record["belief"], &record["policy"]), (&Value::from("cnabu"), &Value::from("mem")));
+    let made_by = &record["made_by"];
+    for network in ["sigma_o", "sigma_m"] {
+        let file = root().join("models").join(network).with_extension("safetensors");
+        assert_eq!(made_by["weights"][network], nudge_core::files::sha256_of_file(&file).expect("read"), "{made_by}");
+    }
+    assert!(made_by["libtorch"].is_string() && made_by["device"].is_string(), "{made_by}");
     let said = nudge_ok(&[
         "run",
         "scenes/demo/first-look.toml",
@@ -169,4 +175,35 @@ fn what_is_run_without_a_word_runs_on_the_networks() {
     ]);
     let record: Value = serde_json::from_str(&said).expect("JSON");
     assert_eq!(record["belief"], "classical", "the policy random is defined on the classical belief");
+}
+
+#[test]
+fn an_episode_of_other_weights_is_not_resumed_and_a_replay_says_which() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (out, models) = (dir.path().join("episode"), dir.path().join("models"));
+    let words = ["run", "scenes/demo/first-look.toml", "--policy", "random-cnabu", "--budget", "2", "--json", "--out"];
+    let run = |models: &Path, more: &[&str]| nudge_with(models, &[&words[..], &[utf8(&out)], more].concat());
+    assert!(run(&root().join("models"), &[]).status.success());
+    let document = out.join("episode.json");
+    let mut record: Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["steps"].as_array_mut().expect("steps").pop();
+    std::fs::write(&document, record.to_string()).expect("written");
+    // The last bit of one weight.
+    std::fs::create_dir(&models).expect("folder");
+    for file in ["sigma_o.safetensors", "sigma_o.toml", "sigma_m.safetensors", "sigma_m.toml"] {
+        let mut bytes = std::fs::read(root().join("models").join(file)).expect("read");
+        let at = bytes.len() - 2;
+        if file == "sigma_o.safetensors" {
+            bytes[at] ^= 1;
+        }
+        std::fs::write(models.join(file), bytes).expect("written");
+    }
+    let said = run(&models, &["--resume"]);
+    let error = text(&said.stderr);
+    assert!(said.status.code() == Some(2) && error.contains("cannot be resumed: the weights sigma_o were "), "{error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+    let said = nudge_with(&models, &["replay", utf8(&out)]);
+    assert!(text(&said.stderr).contains("warning: ") && text(&said.stderr).contains("the weights sigma_o were "));
+    let said = run(&root().join("models"), &["--resume"]);
+    assert!(said.status.success(), "{}", text(&said.stderr));
 }

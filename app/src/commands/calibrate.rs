@@ -1,8 +1,8 @@
 //! `nudge calibrate`: how good and how well calibrated belief updates are on held-out scenes, against the number of views.
 
+use super::progress::Progress;
 use crate::figure::{Calibrated, PIXELS_PER_UNIT, VIEWS, VIEWS_AFTER_PUSH, Views, calibration, escape};
 use crate::picture;
-use indicatif::ProgressBar;
 use nudge_core::Error;
 use nudge_core::belief::{BeliefUpdate, CLASSICAL, CNABU, Classical};
 use nudge_core::cnabu::{self, Scored};
@@ -93,15 +93,20 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             }
             other => anyhow::bail!("unknown belief \"{other}\"; there are cnabu, classical"),
         };
-        let bar = ProgressBar::new(data.len() as u64).with_message(name.clone());
-        let tallies = evaluate(&data, &*update, &mut |done| bar.set_position(done as u64))?;
-        bar.finish_and_clear();
+        let progress = Progress::new(format!("{name} on views"), data.len());
+        let tallies = evaluate(&data, &*update, &mut |done| progress.at(done))?;
+        progress.finish();
         results.push((name.clone(), tallies));
         if let Some(pushes) = &pushes {
-            let tallies = evaluate_pushes(pushes, &*update, &*update, &mut |_| ())?;
+            let progress = Progress::new(format!("{name} on pushes"), pushes.len());
+            let tallies = evaluate_pushes(pushes, &*update, &*update, &mut |done| progress.at(done))?;
+            progress.finish();
             pushed.predictions.push((name.clone(), tallies.predicted.scores()));
             pushed.predictions.push((format!("{name}, as if nothing had changed"), tallies.unchanged.scores()));
-            pushed.afterwards.push((name.clone(), evaluate_after_pushes(pushes, &*update, &mut |_| ())?));
+            let progress = Progress::new(format!("{name} on views after pushes"), pushes.len());
+            let tallies = evaluate_after_pushes(pushes, &*update, &mut |done| progress.at(done))?;
+            progress.finish();
+            pushed.afterwards.push((name.clone(), tallies));
         }
     }
     let of_pushes = args

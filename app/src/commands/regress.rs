@@ -1,10 +1,10 @@
 //! `nudge regress`: a small fixed bench against its golden scores.
 
 use super::bench::workers;
+use super::progress::Progress;
 use super::{print, to_json};
 use crate::regress::{Compared, Golden, OTHER_PROCESSORS};
 use anyhow::Context;
-use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use std::path::{Path, PathBuf};
 
@@ -34,10 +34,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut all = Vec::new();
     for (path, golden) in args.golden.iter().zip(&goldens) {
         let workers = workers(args.jobs, golden.episodes());
-        let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {elapsed}").expect("a constant template");
-        let bar = ProgressBar::new(golden.episodes() as u64).with_style(style);
-        let compared = golden.compare(path, workers, &mut || bar.inc(1))?;
-        bar.finish_and_clear();
+        let progress = Progress::new("regress", golden.episodes());
+        let compared = golden.compare(path, workers, &mut || progress.inc())?;
+        progress.finish();
         if args.bless {
             bless(path, golden, &compared)?;
         } else if !args.json {

@@ -2,10 +2,10 @@
 
 mod table;
 
+use super::progress::Progress;
 use crate::driver::{Driver, belief_update, default_out};
-use crate::planner_args;
-use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
+use nudge_core::camera::NoiseModel;
 use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
 use nudge_core::plan::{Action, PolicyKind};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
@@ -63,6 +63,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let begin_with = |policy, out: &Path| begin(args, policy, scene.clone(), catalog.clone(), out);
     let out = args.out.clone().unwrap_or_else(|| default_out(&scene, args.policy, args.seed));
     let mut main = begin_with(args.policy, &out)?;
+    for warning in &main.episode().arm().arm.warnings {
+        super::warn(&format!("{}: {warning}", main.episode().arm().arm.name));
+    }
     if let Some(why) = main.episode().why_no_push() {
         super::warn(&why);
     }
@@ -70,7 +73,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         table::header(main.episode().record());
         main.episode().record().steps.iter().for_each(|step| table::step(step, args.budget));
     }
-    go_on(&mut main, "", &mut |step| {
+    // It prints a row for every step, the one beside it nothing.
+    go_on(&mut main, Progress::bar("run", args.budget), &mut |step| {
         if !args.json {
             table::step(step, args.budget);
         }
@@ -80,7 +84,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let started = Instant::now();
         let out = beside_of(&out, policy);
         let mut other = begin_with(policy, &out)?;
-        go_on(&mut other, policy.name(), &mut |_| ())?;
+        let (name, budget) = (policy.name(), args.budget);
+        let progress = if args.json { Progress::bar(name, budget) } else { Progress::new(name, budget) };
+        go_on(&mut other, progress, &mut |_| ())?;
         columns.push(Column::of(&other, &out, started)?);
         other.finish()?;
     }
@@ -108,8 +114,8 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
         seed: args.seed,
         budget: args.budget,
         views: args.planning.views.clone(),
-        planner: args.planning.planner.settings(update.name()),
-        noise: None,
+        planner: args.planning.planner.settings(update.name())?,
+        noise: NoiseModel::named(&args.planning.noise)?,
     };
     if !(args.resume && EpisodeDir::state(out)? == DirectoryState::Episode) {
         let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
@@ -117,31 +123,30 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
     }
     let logged = EpisodeDir::open(out)?.record()?;
     same_episode(&logged, &scene, &config, out)?;
-    let bar = bar(logged.steps.len(), "repeating");
+    let progress = Progress::new("repeating", logged.steps.len());
     let driver = Driver::resume(out, catalog, update, &mut |episode, _| {
-        bar.set_position(episode.record().steps.len() as u64);
+        progress.at(episode.record().steps.len());
         Ok(())
     })?;
-    bar.finish_and_clear();
+    progress.finish();
     Ok(driver)
 }
 
 /// Does the actions that are left, and shows each.
-fn go_on(driver: &mut Driver, title: &'static str, show: &mut dyn FnMut(&StepRecord)) -> anyhow::Result<()> {
-    let bar = bar(driver.episode().record().config.budget, title);
-    let title = if title.is_empty() { String::new() } else { format!("{title}: ") };
+fn go_on(driver: &mut Driver, progress: Progress, show: &mut dyn FnMut(&StepRecord)) -> anyhow::Result<()> {
+    let progress = progress.with_done(driver.episode().record().steps.len());
     while !driver.episode().is_finished() {
-        bar.set_position(driver.episode().record().steps.len() as u64);
-        bar.set_message(format!("{title}deciding"));
+        progress.doing("deciding");
         let decision = driver.decide();
-        bar.set_message(match decision.action {
-            Action::Look { .. } => format!("{title}looking"),
-            Action::Push(_) => format!("{title}pushing"),
+        progress.doing(match decision.action {
+            Action::Look { .. } => "looking",
+            Action::Push(_) => "pushing",
         });
         let outcome = driver.act(decision)?;
-        bar.suspend(|| show(&outcome.record));
+        progress.suspend(|| show(&outcome.record));
+        progress.at(outcome.record.index);
     }
-    bar.finish_and_clear();
+    progress.finish();
     Ok(())
 }
 
@@ -171,14 +176,14 @@ fn same_episode(
     out: &std::path::Path,
 ) -> Result<(), Error> {
     let settings = |config: &EpisodeConfig| {
-        let whole = [
-            ("--policy", config.policy.to_string()),
-            ("--belief", config.belief.clone()),
-            ("--seed", config.seed.to_string()),
-            ("--budget", config.budget.to_string()),
-            ("--views", config.views.clone()),
-        ];
-        whole.into_iter().chain(planner_args::options(&config.planner))
+        [
+            ("policy", config.policy.to_string()),
+            ("belief", config.belief.clone()),
+            ("seed", config.seed.to_string()),
+            ("budget", config.budget.to_string()),
+            ("views", config.views.clone()),
+            ("noise", NoiseModel::name_of(config.noise)),
+        ]
     };
     if logged.scene != *scene {
         let message = format!(
@@ -187,15 +192,42 @@ fn same_episode(
         );
         return Err(Error::input(out, "", message));
     }
-    for ((name, before), (_, now)) in settings(&logged.config).zip(settings(config)) {
-        if before != now {
-            return Err(Error::input(out, "", format!("the episode there was run with {name} {before}, not {now}")));
-        }
-    }
-    Ok(())
+    let both = settings(&logged.config).into_iter().zip(settings(config));
+    let mut whole = both.map(|((name, before), (_, now))| (name, before, now)).filter(|(_, before, now)| before != now);
+    let planner = || config.planner.difference(&logged.config.planner);
+    let differs = whole.next().or_else(|| planner().map(|(setting, before, now)| (setting.name, before, now)));
+    differs.map_or(Ok(()), |(name, before, now)| {
+        Err(Error::input(out, "", format!("the episode there was run with --{name} {before}, not {now}")))
+    })
 }
 
-fn bar(length: usize, message: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {msg} {elapsed}").expect("a valid template");
-    ProgressBar::new(length as u64).with_style(style).with_message(message)
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nudge_core::plan::{SETTINGS, Values};
+
+    /// An episode whose gamma was another one was gone on with, without a word.
+    #[test]
+    fn going_on_with_other_settings_is_refused_whichever_it_is() {
+        let logged = crate::fixture::play(1).record;
+        let (scene, config) = (logged.scene.clone(), logged.config.clone());
+        let out = std::path::Path::new("there");
+        let refused = |config: &EpisodeConfig| same_episode(&logged, &scene, config, out).err().map(|e| e.to_string());
+        assert_eq!(refused(&config), None);
+        for setting in SETTINGS {
+            let other = match &setting.values {
+                Values::Whole { range: [_, high], .. } => high.to_string(),
+                Values::Real { range: [_, high], .. } => high.to_string(),
+                Values::Choice { choices, .. } => choices[1].name.to_owned(),
+            };
+            let mut planner = config.planner;
+            setting.set(&mut planner, &other).expect("allowed");
+            let said = refused(&EpisodeConfig { planner, ..config.clone() }).expect(setting.name);
+            let before = setting.value(&config.planner);
+            assert_eq!(said, format!("there: the episode there was run with --{} {before}, not {other}", setting.name));
+        }
+        let noisy = EpisodeConfig { noise: Some(NoiseModel::STANDARD), ..config };
+        let said = refused(&noisy).expect("other noise");
+        assert_eq!(said, "there: the episode there was run with --noise none, not standard");
+    }
 }

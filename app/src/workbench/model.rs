@@ -9,7 +9,7 @@ use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
 use nudge_core::arm::Push;
 use nudge_core::belief::PushPrediction;
-use nudge_core::camera::ViewId;
+use nudge_core::camera::{NoiseModel, ViewId};
 use nudge_core::plan::{PlannerSettings, PolicyKind};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -155,6 +155,10 @@ pub struct StartForm {
     pub seed: u64,
     /// Number of actions.
     pub budget: usize,
+    /// The view array: the name of one that comes with the program, or a file.
+    pub views: String,
+    /// What the camera gets wrong.
+    pub noise: Option<NoiseModel>,
     /// The planner's numbers.
     pub planner: PlannerSettings,
     /// A second policy to run side by side with the first.
@@ -169,6 +173,8 @@ impl Default for StartForm {
             belief: "classical".to_owned(),
             seed: 0,
             budget: 20,
+            views: "standard300".to_owned(),
+            noise: None,
             planner: PlannerSettings::default(),
             against: None,
         }

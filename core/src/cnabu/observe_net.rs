@@ -71,15 +71,26 @@ impl Evidence {
 
     /// The same with left and right exchanged; for planes without padding.
     pub fn mirrored(&self) -> Self {
-        Self { occupancy: mirrored(&self.occupancy), semantics: mirrored(&self.semantics) }
+        let cells = 2 * self.occupancy.size()[2];
+        Self { occupancy: mirrored(&self.occupancy, cells), semantics: mirrored(&self.semantics, cells) }
     }
 }
 
-/// Planes (`[B, quantities * 4, X, Y]`) with left and right exchanged; for planes without padding.
-pub(super) fn mirrored(planes: &Tensor) -> Tensor {
+/// Planes (`[B, quantities * 4, X, Y]`) with left and right exchanged among the first `cells` floor cells along x. What lies
+/// beyond is padding, and stays: the shelf is mirrored, not its surroundings.
+pub(super) fn mirrored(planes: &Tensor, cells: i64) -> Tensor {
     let size = planes.size();
     // A channel is a quantity and a sub-cell `2 (x % 2) + y % 2`; along x both pixels and sub-cells turn round.
-    planes.view([size[0], -1, 2, 2, size[2], size[3]]).flip([2, 4]).view(&size[..])
+    let folded = planes.view([size[0], -1, 2, 2, size[2], size[3]]);
+    let all = 2 * size[2];
+    if cells == all {
+        return folded.flip([2, 4]).view(&size[..]);
+    }
+    // Sub-cells beside their pixels, so that floor cells along x are one axis.
+    let order: Vec<i64> = (0..cells).rev().chain(cells..all).collect();
+    let order = Tensor::from_slice(&order).to_device(planes.device());
+    let rows = folded.permute([0, 1, 3, 4, 2, 5]).reshape([size[0], -1, 2, all, size[3]]).index_select(3, &order);
+    rows.view([size[0], -1, 2, size[2], 2, size[3]]).permute([0, 1, 4, 2, 3, 5]).reshape(&size[..])
 }
 
 /// The network sigma_o.
@@ -187,8 +198,19 @@ impl ObserveNet {
 
 #[cfg(test)]
 mod tests {
-    use super::{LOG_EVIDENCE_LIMIT, limited};
+    use super::{LOG_EVIDENCE_LIMIT, limited, mirrored};
     use tch::Tensor;
+
+    #[test]
+    fn only_the_shelf_is_mirrored_and_not_its_padding() {
+        // Two sub-cells along x and one row: four floor cells, numbered along x, of which three are the shelf.
+        let planes = Tensor::from_slice(&[0_i64, 2, 0, 2, 1, 3, 1, 3]).reshape([1, 4, 2, 1]);
+        let turned = Vec::<i64>::try_from(mirrored(&planes, 3).flatten(0, -1)).expect("numbers");
+        assert_eq!(turned, [2, 0, 2, 0, 1, 3, 1, 3]);
+        assert!(mirrored(&mirrored(&planes, 3), 3).equal(&planes), "twice is as it was");
+        let turned = Vec::<i64>::try_from(mirrored(&planes, 4).flatten(0, -1)).expect("numbers");
+        assert_eq!(turned, [3, 1, 3, 1, 2, 0, 2, 0]);
+    }
 
     #[test]
     fn evidence_is_limited_without_changing_what_is_likeliest() {

@@ -8,6 +8,7 @@ use crate::arm::{Arm, ArmTool, HandPose, Motion, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, SweptPush, look};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet};
+use crate::made_by::{Build, MadeBy};
 use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
 use crate::push::{ArmClearance, Candidate, Counterfactual};
 use crate::rng::stream;
@@ -73,9 +74,12 @@ impl Episode {
         let grid = scene.grid();
         let belief = Arc::new(Belief::uniform(grid));
         let truth = Arc::new(TruthMap::of(&grid, &bodies));
+        let threads = rayon::current_num_threads();
         let record = EpisodeRecord {
             format: FORMAT,
             version: crate::VERSION.to_owned(),
+            made_by: Some(MadeBy::new(Build::default(), update.networks_used(), config.planner, threads)),
+            also_made_by: Vec::new(),
             scene,
             config,
             prior: Scores::of(&belief, &truth),
@@ -98,6 +102,14 @@ impl Episode {
             record,
             deciding: Stopwatch::default(),
         })
+    }
+
+    /// Names the build of the program that makes the steps to come; to be called once, after [`Episode::new`] or
+    /// [`resume`](super::resume), before the first action.
+    pub fn built_from(&mut self, build: Build) {
+        let threads = rayon::current_num_threads();
+        let planner = self.record.config.planner;
+        self.record.go_on_with(MadeBy::new(build, self.update.networks_used(), planner, threads));
     }
 
     /// What the policy would do now, and what it weighed. Changes nothing; the same state decides the same.

@@ -21,6 +21,7 @@ pub type Observer<'a> = &'a mut dyn FnMut(&Episode, Option<&StepOutcome>) -> Res
 /// # Errors
 /// [`Error::Input`] or [`Error::Io`] for a directory that holds no episode or a damaged one, [`Error::Check`] when the
 /// repeated actions do not lead where the log says (written by another version, or on another machine).
+/// [`Error::Input`], too, for an update of other weights than those that made the episode; it names them.
 pub fn resume(
     path: impl AsRef<Path>,
     catalog: Arc<Catalog>,
@@ -28,6 +29,9 @@ pub fn resume(
     observer: Observer<'_>,
 ) -> Result<(EpisodeDir, Episode)> {
     let directory = EpisodeDir::open_to_write(path.as_ref())?;
+    if let Some(words) = directory.record()?.other_weights(&*update) {
+        return Err(Error::input(directory.path(), "", format!("cannot be resumed: {words}")));
+    }
     let (episode, _) = retrace(&directory, catalog, update, Departure::Refused, usize::MAX, observer)?;
     Ok((directory, episode))
 }
@@ -36,7 +40,8 @@ pub fn resume(
 /// the log says (it was written by another version, or on another machine), the filed step, belief and truth stand in
 /// place of the repeated ones, and the first such place is told beside the episode. Bodies and images remain the
 /// repeated ones. Without an update everything is as it is filed, nothing is compared, pushes have no predictions, and
-/// after a push no voxel counts as seen.
+/// after a push no voxel counts as seen: so an episode is to be opened whose update is not here, or here with other weights
+/// ([`EpisodeRecord::other_weights`]).
 ///
 /// # Errors
 /// Those of [`resume`] but for [`Error::Check`], and [`Error::Usage`] for an action of the log that cannot be repeated.

@@ -52,12 +52,14 @@ pub struct Card {
     /// Name of the view array that they are drawn from.
     pub view_array: String,
     /// Numbers of voxels along x, y, z.
+    #[serde(deserialize_with = "crate::fixed::array")]
     pub dims: [usize; 3],
     /// Edge of a voxel, metres.
     pub voxel_m: f32,
     /// Classes by number, background last.
     pub classes: Vec<String>,
     /// Range of the floor share that objects cover.
+    #[serde(deserialize_with = "crate::fixed::array")]
     pub fill: [f32; 2],
     /// How strongly objects line up.
     pub rho: f32,

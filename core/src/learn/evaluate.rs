@@ -92,12 +92,18 @@ fn for_each_push(
 /// (least negative log-likelihood; temperature scaling, Guo et al., "On calibration of modern neural networks", 2017), over
 /// all floor cells that a prediction holds possible to change.
 ///
+/// `progress` is told how many samples are done.
+///
 /// # Errors
 /// When a sample cannot be read.
-pub fn fit_change_temperature(data: &Dataset<PushSample>, update: &dyn BeliefUpdate) -> Result<f64> {
+pub fn fit_change_temperature(
+    data: &Dataset<PushSample>,
+    update: &dyn BeliefUpdate,
+    progress: &mut dyn FnMut(usize),
+) -> Result<f64> {
     let grid = data.grid();
     let mut outcomes = Vec::new();
-    for_each_push(data, update, update, &mut |_| (), &mut |sample, _, pushed, prediction| {
+    for_each_push(data, update, update, progress, &mut |sample, _, pushed, prediction| {
         let changed = sample.changed_by(pushed);
         let cells = prediction.window.cells(&grid).zip(&prediction.change).filter(|(_, p)| **p > 0.0);
         outcomes.extend(cells.map(|(cell, p)| (log_odds(f64::from(*p)), changed[cell])));

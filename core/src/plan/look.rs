@@ -1,7 +1,7 @@
 //! The gain of views: by rays or by coverage.
 //!
-//! Where all voxels count, a view gains what its rays meet ([`gain_of_views`], the paper's formula). Where only unseen ones
-//! do, each counts once ([`Coverage`]).
+//! Where all voxels count, a view gains what its rays meet ([`gain_of_views`], the gain that the paper takes from Delmerico
+//! et al. 2018). Where only unseen ones do, each counts once ([`Coverage`]).
 //!
 //! Before the first look the belief is `p = 0.5` everywhere, and no ray gets farther than a few voxels: all views that
 //! show the shelf's front are equally good. But objects stand on the board. So until something was seen, a voxel

@@ -2,6 +2,7 @@
 
 use super::Column;
 use crate::record::mishaps;
+use nudge_core::camera::NoiseModel;
 use nudge_core::episode::{EpisodeRecord, StepRecord};
 use nudge_core::plan::{Action, Reason};
 use nudge_core::score::{Scores, Verdict};
@@ -9,13 +10,14 @@ use nudge_core::score::{Scores, Verdict};
 pub(super) fn header(record: &EpisodeRecord) {
     let config = &record.config;
     println!(
-        "{}: {} objects, policy {}, {} belief, seed {}, {} actions",
+        "{}: {} objects, policy {}, {} belief, seed {}, {} actions{}",
         record.scene.name,
         record.scene.objects.len(),
         config.policy,
         config.belief,
         config.seed,
-        config.budget
+        config.budget,
+        config.noise.map_or(String::new(), |noise| format!(", noise {}", NoiseModel::name_of(Some(noise))))
     );
     println!(
         "{:>6}  {:<34} {:>9}  {:>6}  {:>6}  {:>9}  {:>6}",

@@ -93,14 +93,14 @@ impl SessionArgs {
         // Early, so that a place that cannot be written is told at once.
         pupil.save(&self.out)?;
         let mut curve = Curve::open(&self.out, self.resume, self.follow, pupil.updates())?;
-        let started = Instant::now();
+        let (started, begun_at) = (Instant::now(), pupil.updates());
         let (mut reported, mut saved, mut validated) = (started, started, started);
         let (mut least, mut stale) = (f64::INFINITY, 0);
         while !self.is_over(pupil.updates(), started) {
             pupil.train(self.rate(pupil.updates()), &mut curve)?;
             if reported.elapsed() >= REPORT_EVERY {
                 reported = Instant::now();
-                curve.report(pupil.updates())?;
+                curve.report(pupil.updates(), self.left(begun_at, pupil.updates(), started.elapsed()))?;
             }
             if saved.elapsed().as_secs_f64() >= 60.0 * self.checkpoint_minutes {
                 saved = Instant::now();
@@ -121,11 +121,21 @@ impl SessionArgs {
             }
         }
         pupil.save(&self.out)?;
-        curve.report(pupil.updates())?;
+        curve.report(pupil.updates(), None)?;
         if self.val.is_some() {
             pupil.validate(&mut curve)?;
         }
         crate::commands::print(&format!("{}: {} updates\n", checkpoint_path(&self.out).display(), pupil.updates()))
+    }
+
+    /// Time to the end that was asked for, as far as one was: `--patience` may stop it sooner.
+    fn left(&self, begun_at: u64, updates: u64, elapsed: Duration) -> Option<Duration> {
+        let (made, elapsed) = (updates.saturating_sub(begun_at) as f64, elapsed.as_secs_f64());
+        let by_updates = self.updates.map(|end| elapsed * end.saturating_sub(updates) as f64 / made);
+        let by_minutes = self.minutes.map(|minutes| (60.0 * minutes - elapsed).max(0.0));
+        // What is no time, or longer than can be told, is left out.
+        let times = by_updates.into_iter().chain(by_minutes).filter_map(|time| Duration::try_from_secs_f64(time).ok());
+        times.min()
     }
 
     fn is_over(&self, updates: u64, started: Instant) -> bool {

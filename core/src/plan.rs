@@ -16,7 +16,7 @@ pub use rule::{
     CLOSING_STEPS, PATIENCE, PUSH_EVERY, PUSH_FLOOR, QUIET_STEPS, RESTORING_STEPS, SATURATION, look_or_push,
     push_guard, saturated, still_closing,
 };
-pub use weigh::{COARSE_VIEWS, disturbance};
+pub use weigh::{COARSE_VIEWS, disturbance, push_sources};
 
 use crate::arm::{ArmTool, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CERTAIN, CNABU, COMPLETE_SHARE};

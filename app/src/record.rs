@@ -10,6 +10,7 @@
 
 pub(crate) mod blueprint;
 pub(crate) mod decision;
+mod disk;
 mod floor;
 mod gain;
 pub(crate) mod layout;
@@ -25,6 +26,7 @@ pub(crate) use decision::mishaps;
 
 use crate::picture;
 use crate::verdicts::Judged;
+use disk::{Disk, Fault};
 use nudge_core::arm::{ArmTool, Joints};
 use nudge_core::belief::{Belief, PushPrediction};
 use nudge_core::camera::{Image, View, ViewArray, ViewId};
@@ -86,6 +88,8 @@ pub struct Recorder {
     root: EntityPath,
     /// The file, for messages.
     file: PathBuf,
+    /// What is wrong with the file.
+    fault: Fault,
     /// The belief before the next step, as rays see it.
     field: Option<GainField>,
     /// Objects with a mesh in the recording that have not been cleared.
@@ -104,7 +108,8 @@ impl Recorder {
 
     /// The same for an episode of which only the states are at hand: [`Recorder::record`] writes them one by one.
     pub fn begin(path: &Path, name: &str, setting: &Setting<'_>) -> Result<Self> {
-        let recorder = Self::bare(file_stream(path, name)?, "", path);
+        let (stream, fault) = file_stream(path, name)?;
+        let recorder = Self::bare(stream, "", path, fault);
         let plan = picture::FloorPlan::of(&setting.shelf.grid());
         recorder.check(layout::standard("", plan).send(&recorder.stream, APPLICATION))?;
         recorder.set_up(setting)?;
@@ -114,18 +119,19 @@ impl Recorder {
     /// Writes into a stream of the caller's, under `root` (`""`, or for example `"b"` for the second episode of a
     /// comparison), without a layout. Wall-clock timelines of the stream are switched off.
     pub fn to_stream(stream: RecordingStream, root: &str, episode: &Episode) -> Result<Self> {
-        let recorder = Self::bare(stream, root, Path::new("recording"));
+        let recorder = Self::bare(stream, root, Path::new("recording"), Fault::default());
         recorder.set_up(&setting(episode))?;
         Ok(recorder)
     }
 
-    fn bare(stream: RecordingStream, root: &str, file: &Path) -> Self {
+    fn bare(stream: RecordingStream, root: &str, file: &Path, fault: Fault) -> Self {
         stream.set_log_time_enabled(false);
         stream.set_log_tick_enabled(false);
         Self {
             stream,
             root: EntityPath::parse_forgiving(root),
             file: file.to_owned(),
+            fault,
             field: None,
             shown: BTreeSet::new(),
             truth: None,
@@ -178,8 +184,9 @@ impl Recorder {
     /// Ends the recording; a file gets its index.
     pub fn finish(self) -> Result<()> {
         self.flush()?;
+        // The file goes with its sink, after it has got its index; the flush waits for that.
         self.stream.disconnect();
-        Ok(())
+        self.flush()
     }
 
     /// Gives the file another name, in the same folder; what is there is replaced, and recording goes on.
@@ -395,11 +402,15 @@ impl Recorder {
     }
 
     fn flush(&self) -> Result<()> {
-        self.check(self.stream.flush_blocking())
+        let flushed = self.stream.flush_blocking();
+        // First what the system said.
+        match self.fault.error() {
+            Some(error) => Err(Error::io(&self.file, error)),
+            None => self.check(flushed),
+        }
     }
 
     fn check<T>(&self, result: std::result::Result<T, impl std::fmt::Display>) -> Result<T> {
-        // The file is written by a thread of the SDK's, which does not tell why it ended; mostly the disk is full.
         result.map_err(|error| Error::input(&self.file, "", format!("the recording cannot be written ({error})")))
     }
 }
@@ -409,14 +420,16 @@ pub fn title(record: &EpisodeRecord) -> String {
     format!("{} seed {}", record.scene.name, record.config.seed)
 }
 
-/// A stream into a file of its own.
-fn file_stream(path: &Path, name: &str) -> Result<RecordingStream> {
+/// A stream into a file of its own, and what will be wrong with that.
+fn file_stream(path: &Path, name: &str) -> Result<(RecordingStream, Fault)> {
     let failed = |error: &dyn std::fmt::Display| Error::io(path, std::io::Error::other(error.to_string()));
-    // Created here first, so that the system's own words reach the user.
-    std::fs::File::create(path).map_err(|error| Error::io(path, error))?;
-    let stream = RecordingStreamBuilder::new(APPLICATION).send_properties(false).save(path).map_err(|e| failed(&e))?;
+    let fault = Fault::default();
+    let disk = Disk::create(path, fault.clone()).map_err(|error| Error::io(path, error))?;
+    let (_, store, properties, batches, hooks, _) =
+        RecordingStreamBuilder::new(APPLICATION).send_properties(false).into_args();
+    let stream = RecordingStream::new(store, properties, batches, hooks, Box::new(disk)).map_err(|e| failed(&e))?;
     stream.send_recording_name(name).map_err(|e| failed(&e))?;
-    Ok(stream)
+    Ok((stream, fault))
 }
 
 fn setting(episode: &Episode) -> Setting<'_> {

@@ -35,6 +35,7 @@ pub struct Intrinsics {
     /// Focal length, pixels.
     pub focal_px: f32,
     /// Nearest and farthest depth that the sensor reports, metres.
+    #[serde(deserialize_with = "crate::fixed::array")]
     pub depth_range_m: [f32; 2],
 }
 

@@ -1,9 +1,10 @@
-//! Files that are there whole or not at all.
+//! Atomic file writing: a file is there whole or not at all.
 //!
 //! A file is written beside its place under a name that starts with [`TEMPORARY`] and then renamed over it. A process
 //! that is killed leaves at most one such leftover, which the next writer removes.
 
 use crate::{Error, Result};
+use sha2::{Digest, Sha256};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,14 +12,74 @@ use std::path::{Path, PathBuf};
 /// How the names of half-written files start.
 pub const TEMPORARY: &str = ".partial-";
 
-/// Writes `bytes` to `path`, whole or not at all.
+/// Writes `bytes` to `path`, whole or not at all. A link is followed, and what is no file but takes bytes (a pipe, a
+/// terminal, `/dev/null`) is written to: neither is ever replaced.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    let temporary = temporary_of(path);
-    let written = write_and_rename(&temporary, path, bytes);
+    let target = match place_of(path)? {
+        Place::File(target) => target,
+        Place::Stream => {
+            let stream = fs::OpenOptions::new().write(true).open(path);
+            return stream.and_then(|mut stream| stream.write_all(bytes)).map_err(|source| Error::io(path, source));
+        }
+    };
+    let temporary = temporary_of(&target);
+    let written = write_and_rename(&temporary, &target, bytes);
     if written.is_err() && !cut::is_cut() {
         let _ = fs::remove_file(&temporary);
     }
     written.map_err(|source| Error::io(path, source))
+}
+
+/// Where a file that is to be at `path` really goes: the end of a chain of links, else `path` itself. For whoever writes
+/// beside it and renames.
+///
+/// # Errors
+/// Something is there that is no file and that a rename would replace.
+pub fn target_of(path: &Path) -> Result<PathBuf> {
+    match place_of(path)? {
+        Place::File(target) => Ok(target),
+        Place::Stream => Err(Error::input(path, "", "is a pipe or a device; a file is needed")),
+    }
+}
+
+/// What a path leads to.
+enum Place {
+    /// A file, or nothing yet: the path without links.
+    File(PathBuf),
+    /// Something that takes bytes one after the other.
+    Stream,
+}
+
+fn place_of(path: &Path) -> Result<Place> {
+    /// More links than this in a row are a circle.
+    const MAX_LINKS: usize = 40;
+    match fs::metadata(path) {
+        Ok(found) if found.is_file() => fs::canonicalize(path).map(Place::File).map_err(|error| Error::io(path, error)),
+        // What the system says of a folder is said when it is written.
+        Ok(found) if found.is_dir() => Ok(Place::File(path.to_owned())),
+        Ok(found) if takes_bytes(found.file_type()) => Ok(Place::Stream),
+        Ok(_) => Err(Error::input(path, "", "is a disk or a socket; a file is needed")),
+        // Nothing yet; perhaps a link to what is to be.
+        Err(_) => {
+            let mut target = path.to_owned();
+            for _ in 0..MAX_LINKS {
+                let Ok(next) = fs::read_link(&target) else { return Ok(Place::File(target)) };
+                target = target.parent().unwrap_or(Path::new("")).join(next);
+            }
+            Err(Error::input(path, "", "is a circle of links"))
+        }
+    }
+}
+
+#[cfg(unix)]
+fn takes_bytes(kind: fs::FileType) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    kind.is_fifo() || kind.is_char_device()
+}
+
+#[cfg(not(unix))]
+fn takes_bytes(_: fs::FileType) -> bool {
+    false
 }
 
 fn write_and_rename(temporary: &Path, path: &Path, bytes: &[u8]) -> std::io::Result<()> {
@@ -63,6 +124,19 @@ pub fn names_in(path: &Path) -> Result<Vec<String>> {
             Ok(names)
         }
     }
+}
+
+/// SHA-256 of bytes, in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// SHA-256 of a file, in hexadecimal digits: what `sha256sum` prints.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn sha256_of_file(path: &Path) -> Result<String> {
+    Ok(sha256(&fs::read(path).map_err(|error| Error::io(path, error))?))
 }
 
 /// Stops writing at a chosen point, as a kill would, so that tests can look at what is left.
@@ -129,6 +203,55 @@ mod tests {
         }
         write_atomically(&path, b"new").expect("written");
         assert_eq!(names_in(directory.path()).expect("listed"), ["file"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn an_output_that_is_a_link_a_pipe_or_a_device_is_not_replaced_by_a_file() {
+        use std::os::unix::fs::{FileTypeExt, symlink};
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let at = |name: &str| directory.path().join(name);
+        let is_link = |name: &str| fs::symlink_metadata(at(name)).expect("there").is_symlink();
+        // A link to a file elsewhere, one to what is not there yet, and a chain of relative ones.
+        fs::create_dir(at("elsewhere")).expect("created");
+        fs::write(at("elsewhere/real"), "old").expect("written");
+        symlink(at("elsewhere/real"), at("link")).expect("linked");
+        symlink("elsewhere/new", at("dangling")).expect("linked");
+        symlink("dangling", at("chain")).expect("linked");
+        write_atomically(&at("link"), b"new").expect("written");
+        write_atomically(&at("chain"), b"fresh").expect("written");
+        assert_eq!(fs::read(at("elsewhere/real")).expect("read"), b"new");
+        assert_eq!(fs::read(at("elsewhere/new")).expect("read"), b"fresh");
+        assert!(is_link("link") && is_link("dangling") && is_link("chain"));
+        symlink("circle", at("circle")).expect("linked");
+        assert!(write_atomically(&at("circle"), b"new").is_err() && is_link("circle"));
+
+        let made = std::process::Command::new("mkfifo").arg(at("pipe")).status().expect("mkfifo");
+        assert!(made.success());
+        let path = at("pipe");
+        let reader = std::thread::spawn(move || fs::read(path).expect("read"));
+        write_atomically(&at("pipe"), b"through").expect("written");
+        assert_eq!(reader.join().expect("no panic"), b"through");
+        assert!(fs::symlink_metadata(at("pipe")).expect("there").file_type().is_fifo());
+        assert!(target_of(&at("pipe")).is_err_and(|error| error.to_string().contains("is a pipe or a device")));
+
+        write_atomically(Path::new("/dev/null"), b"nothing").expect("written");
+        if Path::new("/dev/full").exists() {
+            assert!(write_atomically(Path::new("/dev/full"), b"something").is_err());
+        }
+        assert!(fs::symlink_metadata("/dev/null").expect("there").file_type().is_char_device());
+    }
+
+    #[test]
+    fn hashes_are_those_of_the_standard() {
+        // FIPS 180-4, the examples of one block and of none.
+        assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+        assert_eq!(sha256(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let path = directory.path().join("file");
+        fs::write(&path, b"abc").expect("written");
+        assert_eq!(sha256_of_file(&path).expect("read"), sha256(b"abc"));
+        assert!(sha256_of_file(&directory.path().join("none")).is_err());
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub use check::{MAX_OBJECTS, MAX_VOXELS, Problem};
 pub use file::FORMAT;
 pub use generate::{GenerateConfig, generate};
 pub(crate) use mesh::read_mesh_points;
-pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, load_mesh};
+pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, Unit, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
 pub use rescale::{rescale, rescale_if_room};
 pub use robot::{RobotFile, RobotPlacement};
@@ -103,6 +103,9 @@ impl Object {
 pub struct MeshShape {
     /// The file that it was read from, relative to the scene.
     pub source: String,
+    /// The file's unit, where the scene names it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<Unit>,
     /// Corners of each convex part.
     pub parts: Vec<Vec<[f32; 3]>>,
 }

@@ -280,3 +280,35 @@ fn export_of(episode: &Path, into: &Path) -> nudge::workbench::session::Session 
     nudge::workbench::export::write_episode(&session, into, &|_| true).expect("exported");
     session
 }
+
+#[test]
+fn an_episode_of_networks_is_shown_where_their_weights_are_broken() {
+    let dir = tempfile::tempdir().expect("folder");
+    let (out, models) = (dir.path().join("episode"), dir.path().join("models"));
+    let path = out.to_str().expect("utf-8");
+    nudge_ok(&["run", "scenes/demo/first-look.toml", "--belief", "classical", "--budget", "1", "--out", path]);
+    let document = out.join("episode.json");
+    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["belief"] = "cnabu".into();
+    std::fs::write(&document, record.to_string()).expect("written");
+    std::fs::create_dir(&models).expect("folder");
+    for file in ["sigma_o.safetensors", "sigma_o.toml", "sigma_m.safetensors", "sigma_m.toml"] {
+        let bytes = std::fs::read(root().join("models").join(file)).expect("read");
+        let kept = if file == "sigma_o.safetensors" { bytes.len() / 3 } else { bytes.len() };
+        std::fs::write(models.join(file), &bytes[..kept]).expect("written");
+    }
+    let picture = dir.path().join("shown.png");
+    let shot = Command::new(nudge_bin())
+        .current_dir(root())
+        .env("NUDGE_MODELS", &models)
+        .args(["shot", path, "--size", "1440x900", "--out", picture.to_str().expect("utf-8")])
+        .output()
+        .expect("nudge starts");
+    assert!(shot.status.success(), "{}", text(&shot.stderr));
+    assert!(image::open(&picture).expect("a picture").into_rgb8().width() == 1440);
+    // To go on with it is another thing.
+    let replay =
+        Command::new(nudge_bin()).env("NUDGE_MODELS", &models).args(["replay", path]).output().expect("starts");
+    let said = text(&replay.stderr);
+    assert!(replay.status.code() == Some(2) && said.contains("sigma_o.safetensors"), "{said}");
+}

@@ -3,7 +3,7 @@
 use super::scene::unknown_class;
 use super::{print, to_json, warn};
 use crate::picture;
-use nudge_core::scene::{Catalog, Class, MeshReport, PartsFrom, load_mesh};
+use nudge_core::scene::{Catalog, Class, MeshReport, PartsFrom, Unit, load_mesh};
 use std::path::PathBuf;
 
 /// Show what a mesh file (OBJ, STL, GLB) becomes: convex parts, size, footprint, volume and mass.
@@ -14,6 +14,9 @@ pub struct Args {
     /// Class that it stands for; gives the mass, and helps to tell the unit
     #[arg(long, value_name = "NAME")]
     class: Option<String>,
+    /// The file's unit: m, dm, cm, mm, in or km [default: guessed from the size]
+    #[arg(long)]
+    unit: Option<Unit>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -33,7 +36,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Some(name) => Some(catalog.by_name(name).ok_or_else(|| unknown_class(&catalog, name))?),
         None => None,
     };
-    let (shape, report) = load_mesh(&args.file, &args.file.to_string_lossy(), class)?;
+    let (shape, report) = load_mesh(&args.file, &args.file.to_string_lossy(), class, args.unit)?;
     for warning in &report.warnings {
         warn(&format!("{}: {warning}", report.file));
     }
@@ -61,13 +64,14 @@ fn table(report: &MeshReport, class: Option<&Class>) -> String {
         None => format!("{:.3} kg, an estimate at 0.4 g/cm3 (--class NAME takes the class's)", report.mass_kg),
     };
     let mut text = format!(
-        "{}\n  mesh       {} triangles, {} corners, {} components\n  parts      {parts}, {obtained}\n  corners    {}\n  \
+        "{}\n  mesh       {} triangles, {} corners, {} components, in {}\n  parts      {parts}, {obtained}\n  corners    {}\n  \
          size       {}\n  footprint  {} turned by {:.1} degrees, {:.1} cm2\n  volume     {:.1} cm3 (parts {:.1} cm3)\n  \
          mass       {mass}\n",
         report.file,
         report.triangles,
         report.vertices,
         report.components,
+        report.unit.name(),
         corners.join(" + "),
         millimetres(&report.size_m),
         millimetres(&report.footprint.size_m),

@@ -1,4 +1,4 @@
-//! `nudge robot`: what an arm is and what it reaches.
+//! `nudge robot`: checks an arm and shows what it reaches.
 
 use super::{print, to_json, warn};
 use crate::picture;
@@ -6,7 +6,7 @@ use nudge_core::Error;
 use nudge_core::arm::{Arm, ArmTool, JointKind, Reach};
 use nudge_core::camera::{View, ViewArray};
 use nudge_core::push::TOOL_HEIGHT_M;
-use nudge_core::scene::{Catalog, RobotPlacement, Scene, Shelf};
+use nudge_core::scene::{Catalog, RobotFile, RobotPlacement, Scene, Shelf};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -27,7 +27,7 @@ enum Command {
     Check(CheckArgs),
 }
 
-/// Read a URDF file, and tell what the arm reaches in the shelf and which views its hand can be at
+/// Read a URDF file, and show what the arm reaches in the shelf and which views its hand can take
 #[derive(clap::Args, Debug)]
 struct CheckArgs {
     /// The arm's URDF file
@@ -35,6 +35,12 @@ struct CheckArgs {
     /// Scene whose shelf it stands before, where the scene's [robot] has it [default: the standard shelf and place]
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
+    /// Its link at the finger tip, z ahead, x along the gripper's broad side [default: `tool` or another usual name]
+    #[arg(long, value_name = "LINK")]
+    tool: Option<String>,
+    /// Its link of the camera in hand, x right, y down, z forward [default: `camera` or another usual name]
+    #[arg(long, value_name = "LINK")]
+    camera: Option<String>,
     /// View arrays, by name or file
     #[arg(long, value_delimiter = ',', default_value = "standard300,real75", value_name = "ARRAY,...")]
     views: Vec<String>,
@@ -52,13 +58,17 @@ struct Report {
     name: String,
     file: String,
     closed_form: bool,
+    /// The link at the finger tip.
+    tool: String,
+    /// The link of the camera in hand.
+    camera: Option<String>,
     camera_in_hand: bool,
     base: [f32; 3],
     yaw_deg: f32,
     joints: Vec<JointReport>,
     /// From the first joint to the finger tip, every bend stretched, metres.
     stretched_m: f64,
-    /// Where the arm waits, rad or m; `null` where it reaches no place before the shelf.
+    /// The waiting configuration, rad or m; `null` where the arm reaches no place before the shelf.
     waits_at: Option<Vec<f64>>,
     reach: ReachReport,
     views: Vec<ViewsReport>,
@@ -86,7 +96,7 @@ struct ViewsReport {
     array: String,
     views: usize,
     reachable: Vec<u16>,
-    /// How many of the others are out of reach for which reason.
+    /// Number of views out of reach, by reason.
     faults: BTreeMap<String, usize>,
 }
 
@@ -105,7 +115,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
     };
     let arrays = args.views.iter().map(|name| ViewArray::named(name)).collect::<Result<Vec<_>, _>>()?;
-    let tool = ArmTool::new(Arm::load(&args.file, &placement)?, shelf);
+    let mut urdf = RobotFile::read(&args.file, args.file.to_string_lossy())?;
+    (urdf.tool, urdf.camera) = (args.tool.clone(), args.camera.clone());
+    let placement = RobotPlacement { urdf: Some(urdf), ..placement };
+    let tool = ArmTool::new(Arm::placed(&placement)?, shelf);
+    tool.arm.warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", args.file.display())));
     let reach = tool.reach(TOOL_HEIGHT_M, STEP_M);
     let mut views: Vec<Vec<(View, bool)>> = Vec::new();
     for array in &arrays {
@@ -161,6 +175,8 @@ fn report(
         name: arm.name.clone(),
         file: args.file.display().to_string(),
         closed_form: arm.has_closed_form(),
+        tool: arm.tool_link.clone(),
+        camera: arm.camera_link.clone(),
         camera_in_hand: arm.last_from_camera.is_some(),
         base: placement.base,
         yaw_deg: placement.yaw_deg,
@@ -182,7 +198,9 @@ fn table(report: &Report) -> String {
         report.joints.len(),
         report.yaw_deg
     );
+    let camera_link = report.camera.as_deref().unwrap_or("none (--camera names one)");
     // Writing into a string cannot fail.
+    let _ = writeln!(text, "  links      tool {}, camera {camera_link}", report.tool);
     for joint in &report.joints {
         let (unit, speed, scale) = match joint.kind {
             "turning" => ("deg", "deg/s", 180.0 / std::f64::consts::PI),

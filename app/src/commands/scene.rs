@@ -1,7 +1,7 @@
 //! `nudge scene`: make, check, generate, rescale and draw scene files.
 
+use super::progress::Progress;
 use super::{print, to_json, warn};
-use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::camera::{ViewArray, hidden_objects};
@@ -47,7 +47,7 @@ struct NewArgs {
     force: bool,
 }
 
-/// Check scene files, and tell how full they are, how many objects no view shows, and how well a map can be without these
+/// Check scene files: how full they are, how many objects no view shows, and how good a map without these can be
 #[derive(clap::Args, Debug)]
 struct CheckArgs {
     /// Scene files
@@ -76,15 +76,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
 }
 
-/// A bar on standard error, when that is a terminal and there is more than one thing to wait for.
-fn progress(count: usize, what: &str) -> ProgressBar {
-    if count < 2 {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}").expect("a constant template");
-    ProgressBar::new(count as u64).with_style(style).with_message(what.to_owned())
-}
-
 fn new(args: &NewArgs) -> anyhow::Result<()> {
     let catalog = Catalog::standard();
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", args.name)));
@@ -108,11 +99,14 @@ fn template(name: &str, catalog: &Catalog) -> String {
          # voxel_m = 0.005                # edge of a voxel\n\
          # column_closure = true          # above free all is free, below occupied all is occupied\n\n\
          # [meshes]                       # shapes of one's own: class = mesh file, relative to this file\n\
-         # chips_can = \"chips_can.obj\"\n\n\
+         # chips_can = \"chips_can.obj\"\n\
+         # gum_tin = {{ file = \"tin.stl\", unit = \"in\" }}   # m, dm, cm, mm, in, km; guessed where it is left out\n\n\
          # [robot]                        # the arm before the shelf; these are the defaults\n\
          # base = [0.0, -0.70, -0.015]    # origin of its base, as high as the table that it stands on\n\
          # yaw_deg = 0.0                  # turn of the base\n\
-         # urdf = \"my_arm.urdf\"          # an arm of one's own, relative to this file, for the UR5 that Nudge has\n\n\
+         # urdf = \"my_arm.urdf\"          # an arm of one's own, relative to this file, for the UR5 that Nudge has\n\
+         # tool = \"tip\"                 # its link at the finger tip, where that has no usual name\n\
+         # camera = \"lens\"              # its link of the camera in hand\n\n\
          # Classes, with their size along x, y, z in metres:\n"
     );
     for class in &catalog.classes {
@@ -146,14 +140,14 @@ struct Facts {
     fill: f32,
     /// Objects unseen from every view, as `class#id`.
     hidden: Vec<String>,
-    /// What a perfect map of all the others has: what is beyond that has to be pushed free, or guessed.
+    /// Scores of a perfect map of all other objects: anything better needs pushes, or a lucky guess.
     without_hidden: Scores,
 }
 
 fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let catalog = Catalog::standard();
     let views = ViewArray::named(&args.views)?;
-    let bar = progress(args.files.len(), "checking");
+    let bar = Progress::new("check", args.files.len());
     let mut documents = Vec::new();
     let mut last_error: Option<Error> = None;
     for file in &args.files {
@@ -189,9 +183,9 @@ fn check(args: &CheckArgs) -> anyhow::Result<()> {
             }
         }
         documents.push(document);
-        bar.inc(1);
+        bar.inc();
     }
-    bar.finish_and_clear();
+    bar.finish();
     if args.json {
         print(&to_json(&serde_json::json!({ "scenes": documents }))?)?;
     }
@@ -201,6 +195,7 @@ fn check(args: &CheckArgs) -> anyhow::Result<()> {
 fn check_file(file: &Path, catalog: &Catalog, views: &ViewArray) -> nudge_core::Result<(Facts, Vec<String>)> {
     let (scene, mut warnings) = Scene::load(file, catalog)?;
     let arm = ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf);
+    warnings.extend(arm.arm.warnings.iter().map(|warning| format!("{}: {warning}", arm.arm.name)));
     if arm.ready.is_none() {
         warnings.push(format!("{} reaches no place before the shelf from where it stands", arm.arm.name));
     }

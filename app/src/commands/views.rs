@@ -1,9 +1,7 @@
 //! `nudge views`: the poses of a view array.
 
-use anyhow::Context;
 use nudge_core::camera::{Intrinsics, View, ViewArray};
 use serde::Serialize;
-use std::io::Write;
 
 /// Print the candidate camera poses of a view array.
 #[derive(clap::Args, Debug)]
@@ -47,15 +45,10 @@ struct Pose {
 ///
 /// # Errors
 ///
-/// An unknown array, a wrong file, or an output that cannot be written to.
+/// An unknown array, or a wrong file.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let array = ViewArray::named(&args.array)?;
-    let text = if args.json { json(&array)? } else { table(&array) };
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        // A reader that has seen enough (`| head`) is no failure.
-        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        result => result.context("standard output"),
-    }
+    super::print(&if args.json { json(&array)? } else { table(&array) })
 }
 
 fn json(array: &ViewArray) -> anyhow::Result<String> {

@@ -129,6 +129,7 @@ pub(crate) fn reason(reason: Reason) -> &'static str {
         Reason::LookTellsMore => "looking tells more",
         Reason::PushTellsLittle => "no push promises enough",
         Reason::PushTellsMore => "pushing tells more",
+        Reason::PushReveals => "the push really brings something hidden into sight",
         Reason::ViewOfPush => "the view that made the push worth it",
         Reason::TooEarly => "no push in the first steps",
         Reason::LastStep => "no push in the last steps",

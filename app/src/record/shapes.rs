@@ -140,7 +140,7 @@ pub fn frusta_colors(gains: &[f32], range: [f32; 2]) -> rerun::LineStrips3D {
 
 /// The camera that took an image, at the size that images are recorded.
 pub fn pinhole(intrinsics: &Intrinsics) -> rerun::Pinhole {
-    let size = [intrinsics.width, intrinsics.height].map(|n| (n / IMAGE_STEP) as f32);
+    let size = thinned_size([intrinsics.width, intrinsics.height]).map(|n| n as f32);
     let focal = intrinsics.focal_px / IMAGE_STEP as f32;
     rerun::Pinhole::from_focal_length_and_resolution([focal, focal], size)
         .with_image_plane_distance(0.10)
@@ -148,14 +148,14 @@ pub fn pinhole(intrinsics: &Intrinsics) -> rerun::Pinhole {
         .with_line_width(rerun::Radius::new_ui_points(1.6))
 }
 
-/// Every [`IMAGE_STEP`]th pixel of an image.
+/// Every [`IMAGE_STEP`]th pixel of an image, the first one always.
 fn thinned<T: Copy>(pixels: &[T], [width, height]: [usize; 2]) -> impl Iterator<Item = T> + '_ {
-    let rows = (0..height / IMAGE_STEP).map(|row| row * IMAGE_STEP);
-    rows.flat_map(move |row| (0..width / IMAGE_STEP).map(move |column| pixels[row * width + column * IMAGE_STEP]))
+    let rows = (0..height).step_by(IMAGE_STEP);
+    rows.flat_map(move |row| (0..width).step_by(IMAGE_STEP).map(move |column| pixels[row * width + column]))
 }
 
 fn thinned_size(size: [usize; 2]) -> [u32; 2] {
-    size.map(|n| (n / IMAGE_STEP) as u32)
+    size.map(|n| n.div_ceil(IMAGE_STEP) as u32)
 }
 
 /// Depth in millimetres, 16 bit, as a PNG.

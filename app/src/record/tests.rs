@@ -95,8 +95,8 @@ fn entities_are_named_as_the_contract_says() {
     assert_eq!(paths::robot_body(2), "robot/bodies/2");
     assert_eq!(paths::score("entropy_nats"), "scores/entropy_nats");
     let (stream, _storage) = RecordingStreamBuilder::new(APPLICATION).memory().expect("stream");
-    assert_eq!(Recorder::bare(stream.clone(), "", Path::new("")).at(paths::LOG).to_string(), "/log");
-    assert_eq!(Recorder::bare(stream, "b", Path::new("")).at(paths::LOG).to_string(), "/b/log");
+    assert_eq!(Recorder::bare(stream.clone(), "", Path::new(""), Fault::default()).at(paths::LOG).to_string(), "/log");
+    assert_eq!(Recorder::bare(stream, "b", Path::new(""), Fault::default()).at(paths::LOG).to_string(), "/b/log");
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod take_in;
 mod tests;
 
 use super::browser::Browser;
-use super::command::Command;
+use super::command::{Command, Level};
 use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};
@@ -19,8 +19,9 @@ use super::tasks::Tasks;
 use super::threads::Threads;
 use super::viewer::Viewer;
 use super::worker::{Event, Worker};
+use crate::planner_args::PlannerArgs;
 use nudge_core::arm::Push;
-use nudge_core::camera::ViewId;
+use nudge_core::camera::{NoiseModel, ViewId};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::Catalog;
 use re_viewer::external::{eframe, egui};
@@ -41,8 +42,10 @@ pub struct Options {
     pub form: FormOptions,
     /// The folder that new episodes go to.
     pub out: PathBuf,
-    /// The folder of the scenes to choose from.
+    /// The folder of the scenes to choose from, and where new ones go.
     pub scenes: PathBuf,
+    /// The folder of the scenes that came with the program, to choose from as well.
+    pub shipped_scenes: Option<PathBuf>,
     /// Whether choices outlast the program.
     pub remember: bool,
     /// Light instead of dark; what is remembered otherwise.
@@ -68,6 +71,12 @@ pub struct FormOptions {
     pub budget: Option<usize>,
     /// Seed of every random choice.
     pub seed: Option<u64>,
+    /// The view array.
+    pub views: Option<String>,
+    /// What the camera gets wrong, `Some(None)` for nothing.
+    pub noise: Option<Option<NoiseModel>>,
+    /// The planner's settings.
+    pub planner: PlannerArgs,
 }
 
 /// Something to do before the program ends by itself.
@@ -86,6 +95,7 @@ impl Default for Options {
             form: FormOptions::default(),
             out: PathBuf::from("out"),
             scenes: PathBuf::from(super::browser::FOLDER),
+            shipped_scenes: None,
             remember: false,
             light: None,
             layout: None,
@@ -302,7 +312,10 @@ impl App {
         let repaint = ctx.clone();
         let wake: Wake = Arc::new(move || repaint.request_repaint());
         Self {
-            model: Model { browser: Browser::of(&options.scenes), ..Model::default() },
+            model: Model {
+                browser: Browser::of(&options.scenes).and_shipped(options.shipped_scenes.clone()),
+                ..Model::default()
+            },
             options,
             catalog: Arc::new(Catalog::standard()),
             workers: BTreeMap::new(),
@@ -350,6 +363,14 @@ impl App {
         form.policy = chosen.policy.unwrap_or(form.policy);
         form.budget = chosen.budget.unwrap_or(form.budget);
         form.seed = chosen.seed.unwrap_or(form.seed);
+        form.noise = chosen.noise.unwrap_or(form.noise);
+        if let Some(views) = &chosen.views {
+            form.views.clone_from(views);
+        }
+        match chosen.planner.onto(form.planner) {
+            Ok(planner) => form.planner = planner,
+            Err(error) => self.model.toasts.tell(Level::Error, error.to_string()),
+        }
         self.model.author.wake_with(self.wake.clone());
         if let Some(path) = self.options.open.clone() {
             if self.options.layout.is_none() && self.model.kept.layout == LayoutKind::Author {

@@ -10,7 +10,7 @@ use super::toasts::Toasts;
 use crate::driver::default_belief;
 use nudge_core::arm::Push;
 use nudge_core::belief::PushPrediction;
-use nudge_core::camera::ViewId;
+use nudge_core::camera::{NoiseModel, ViewId};
 use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -156,6 +156,10 @@ pub struct StartForm {
     pub seed: u64,
     /// Number of actions.
     pub budget: usize,
+    /// The view array: the name of one that comes with the program, or a file.
+    pub views: String,
+    /// What the camera gets wrong.
+    pub noise: Option<NoiseModel>,
     /// The planner's numbers.
     pub planner: PlannerSettings,
     /// A second policy to run side by side with the first.
@@ -172,7 +176,9 @@ impl Default for StartForm {
             belief: belief.to_owned(),
             seed: 0,
             budget: 20,
-            planner: PlannerSettings::default().counting(Counted::of_belief(belief)),
+            views: "standard300".to_owned(),
+            noise: None,
+            planner: PlannerSettings::of_belief(belief),
             against: None,
         }
     }
@@ -390,7 +396,7 @@ mod tests {
         let here = nudge_core::cnabu::AVAILABLE && nudge_core::cnabu::models_dir().is_some();
         assert_eq!(form.belief, if here { CNABU } else { CLASSICAL });
         assert_eq!(form.planner.counted, if here { Counted::Unseen } else { Counted::All });
-        assert_eq!(form.planner, PlannerSettings::default().counting(form.planner.counted));
+        assert_eq!(form.planner, PlannerSettings::of_belief(&form.belief));
         let classical = form.with_belief(CLASSICAL);
         assert_eq!((classical.belief.as_str(), classical.planner), (CLASSICAL, PlannerSettings::default()));
     }

@@ -282,7 +282,7 @@ fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Momen
 }
 
 fn update_named(name: &str, config: &EpisodeConfig) -> Result<Arc<dyn BeliefUpdate>> {
-    Ok(crate::driver::belief_update(Some(name), config.policy)?.0)
+    crate::driver::belief_update(Some(name), config.policy)
 }
 
 fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Result<(Track, Opened)> {
@@ -320,9 +320,14 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
                 });
                 Ok((Track::Reading, opened(&path, &episode, update, moments, Some(reason))?))
             };
-            let update = match update_of(&record.config.belief)? {
-                Ok(update) => update,
-                Err(why) => return look(None, format!("{why}; {HELD}")),
+            // Networks that are not here, cannot be read, or have other weights than those that made it.
+            let update = match update_of(&record.config.belief) {
+                Ok(Ok(update)) => match record.other_weights(&*update) {
+                    None => update,
+                    Some(words) => return look(None, format!("{words}; {HELD}")),
+                },
+                Ok(Err(why)) => return look(None, format!("{why}; {HELD}")),
+                Err(error) => return look(None, format!("{error}; {HELD}")),
             };
             if look_only {
                 return look(Some(update), "nothing in its directory shall change".to_owned());

@@ -1,10 +1,10 @@
 //! What a URDF file says, before it is checked: links with their collision shapes, and joints.
 //!
-//! Only what an arm needs is read: `link` (its `collision`s), `joint` with `origin`, `axis`, `limit` and `mimic`. The XML
+//! Only what an arm needs is read: `link` (its `collision`s, or its `visual`s where it has none), `joint` with `origin`, `axis`, `limit` and `mimic`. The XML
 //! is read by `roxmltree`, which keeps the place of every element, so that a fault is told with its line. (The crate
 //! `urdf-rs` reads the same format, but forgets the places.)
 
-use crate::scene::robot::xml;
+use crate::scene::robot::{has_only_visuals, xml};
 use crate::{Error, Result};
 use nalgebra::{Translation3, UnitQuaternion};
 use roxmltree::{Document, Node};
@@ -12,7 +12,7 @@ use std::path::Path;
 
 use super::Frame;
 
-/// Numbers beyond this are no lengths of an arm, metres.
+/// Larger numbers are refused as lengths of an arm, metres.
 pub(super) const FAR_M: f64 = 20.0;
 
 /// A robot as its file describes it.
@@ -32,6 +32,8 @@ pub(super) struct Named {
 pub(super) struct Link {
     pub at: Named,
     pub collisions: Vec<Collision>,
+    /// Whether these are the visuals of a link that has no collision shapes.
+    pub from_visuals: bool,
 }
 
 pub(super) struct Collision {
@@ -59,8 +61,8 @@ pub(super) struct JointElement {
     pub axis: [f64; 3],
     /// Lower and upper; both 0 where they are missing.
     pub limits: [f64; 2],
-    /// Largest speed, rad/s or m/s; 0 where it is missing.
-    pub speed: f64,
+    /// Largest speed, rad/s or m/s, if it is there.
+    pub speed: Option<f64>,
     /// The joint that it follows.
     pub mimic: Option<String>,
 }
@@ -115,17 +117,19 @@ impl Reader<'_> {
     }
 
     fn link(&self, node: Node<'_, '_>) -> Result<Link> {
+        let from_visuals = has_only_visuals(&node);
+        let tag = if from_visuals { "visual" } else { "collision" };
         let mut collisions = Vec::new();
-        for collision in node.children().filter(|child| child.has_tag_name("collision")) {
+        for collision in node.children().filter(|child| child.has_tag_name(tag)) {
             let geometry = child(&collision, "geometry").and_then(|g| g.children().find(Node::is_element));
-            let Some(shape) = geometry else { return self.wrong(&collision, "a collision without a shape") };
+            let Some(shape) = geometry else { return self.wrong(&collision, format!("a {tag} without a shape")) };
             collisions.push(Collision {
                 line: self.line(&collision),
                 link_from_shape: self.origin(&collision)?,
                 geometry: self.geometry(&shape)?,
             });
         }
-        Ok(Link { at: self.named(&node)?, collisions })
+        Ok(Link { at: self.named(&node)?, collisions, from_visuals })
     }
 
     fn geometry(&self, shape: &Node<'_, '_>) -> Result<Geometry> {
@@ -161,8 +165,8 @@ impl Reader<'_> {
         let Some(kind) = node.attribute("type") else { return self.wrong(&node, "has no type") };
         let axis = child(&node, "axis").map(|axis| self.numbers::<3>(&axis, "xyz")).transpose()?.flatten();
         let limit = child(&node, "limit");
-        let number = |name: &str| -> Result<f64> {
-            Ok(limit.map(|limit| self.numbers::<1>(&limit, name)).transpose()?.flatten().map_or(0.0, |[value]| value))
+        let number = |name: &str| -> Result<Option<f64>> {
+            Ok(limit.map(|limit| self.numbers::<1>(&limit, name)).transpose()?.flatten().map(|[value]| value))
         };
         Ok(JointElement {
             at,
@@ -171,7 +175,7 @@ impl Reader<'_> {
             child: end("child")?,
             parent_from_joint: self.origin(&node)?,
             axis: axis.unwrap_or([1.0, 0.0, 0.0]),
-            limits: [number("lower")?, number("upper")?],
+            limits: [number("lower")?.unwrap_or(0.0), number("upper")?.unwrap_or(0.0)],
             speed: number("velocity")?,
             mimic: child(&node, "mimic").map(|mimic| mimic.attribute("joint").unwrap_or_default().to_owned()),
         })

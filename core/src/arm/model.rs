@@ -90,6 +90,12 @@ pub struct Arm {
     pub last_from_tool: Frame,
     /// From the camera's frame (x right, y down, z forward) to the last body's, when there is a camera in hand.
     pub last_from_camera: Option<Frame>,
+    /// The link that is the tool's frame.
+    pub tool_link: String,
+    /// The link that is the camera's frame.
+    pub camera_link: Option<String>,
+    /// What a person should know about the file that it was read from.
+    pub warnings: Vec<String>,
     /// Per joint, how far the farthest point that it moves can be from its axis, metres (1 for a sliding joint): a
     /// change of the joint moves no point of the arm farther than that times the change.
     pub reach_m: Joints,

@@ -14,21 +14,26 @@ const SIDES: usize = 16;
 /// Convex shapes of a link in its body's frame. `file` has the meshes.
 ///
 /// # Errors
-/// Shapes without volume, meshes that are not there: one line that names `path`, line and link.
+/// Shapes without volume, meshes that are not there: one line that names `path`, line and link. A visual that stands in
+/// for a collision shape is left out instead, since it was not made for it.
 pub(super) fn of_link(file: &RobotFile, path: &Path, link: &Link, body_from_link: &Frame) -> Result<Vec<ConvexPart>> {
     let mut shapes = Vec::new();
     for collision in &link.collisions {
-        let wrong = |message: String| {
-            let mut at = link.at.clone();
-            at.line = collision.line;
-            Error::input(path, place("link", &at), message)
-        };
         let from_shape = body_from_link * collision.link_from_shape;
-        let points = corners(file, &collision.geometry).map_err(wrong)?;
-        let place = |p: &Point| (from_shape * p.map(f64::from)).map(|v| v as f32);
-        let points: Vec<Point> = points.iter().map(place).collect();
-        let part = ConvexPart::hull(&points).ok_or_else(|| wrong("a collision shape has no volume".to_owned()))?;
-        shapes.push(part);
+        let place_point = |p: &Point| (from_shape * p.map(f64::from)).map(|v| v as f32);
+        let shape = corners(file, &collision.geometry).and_then(|points| {
+            let points: Vec<Point> = points.iter().map(place_point).collect();
+            ConvexPart::hull(&points).ok_or_else(|| "a collision shape has no volume".to_owned())
+        });
+        match shape {
+            Ok(shape) => shapes.push(shape),
+            Err(_) if link.from_visuals => {}
+            Err(message) => {
+                let mut at = link.at.clone();
+                at.line = collision.line;
+                return Err(Error::input(path, place("link", &at), message));
+            }
+        }
     }
     Ok(shapes)
 }

@@ -1,9 +1,9 @@
 //! Reading an arm from a URDF file.
 //!
-//! The chain goes from the root link to the link named `tool` (or `tool0`, `tcp`, `tool_tip`), whose frame has its
-//! origin at the finger tip, z as the approach axis and x along the gripper's broad side. A link named `camera` (or
-//! `camera_optical_frame`) is the camera in hand. Joints off the chain (fingers) stay at zero. Collision shapes are
-//! boxes, cylinders, capsules, spheres, and convex hulls of meshes (.stl, .obj, .glb); visuals are not read.
+//! The chain goes from the root link to the tool's, whose frame has its origin at the finger tip, z as the approach axis
+//! and x along the gripper's broad side; the module `ends` knows what it and the camera in hand are usually called.
+//! Joints off the chain (fingers) stay at zero. Collision shapes are boxes, cylinders, capsules, spheres, and convex hulls
+//! of meshes (.stl, .obj, .glb). A link without any has its visuals instead.
 
 use super::bounds::{reaches, self_pairs};
 use super::closed_form::ThreeParallel;
@@ -11,7 +11,7 @@ use super::cover::{Ball, cover};
 use super::description::{Description, JointElement};
 use super::model::{Arm, Joint, JointKind, Part, Role, identity};
 use super::tree::{Tree, place};
-use super::{Frame, Joints, MAX_JOINTS, frame_of, shapes};
+use super::{Frame, Joints, MAX_JOINTS, ends, frame_of, shapes};
 use crate::scene::{RobotFile, RobotPlacement};
 use crate::{Error, Result};
 use nalgebra::{Unit, Vector3};
@@ -23,13 +23,17 @@ use std::path::Path;
 const SHIPPED: &str = include_str!("../../../assets/robots/ur5_2f85.urdf");
 /// Its name in messages.
 const SHIPPED_NAME: &str = "ur5_2f85.urdf";
-const TOOL_LINKS: [&str; 4] = ["tool", "tool_tip", "tcp", "tool0"];
-const CAMERA_LINKS: [&str; 2] = ["camera", "camera_optical_frame"];
 
 impl Arm {
     /// The UR5 with a closed Robotiq 2F-85 gripper that comes with the program, where `placement` puts it.
     pub fn standard(placement: &RobotPlacement) -> Self {
-        let file = RobotFile { source: SHIPPED_NAME.to_owned(), text: SHIPPED.to_owned(), meshes: BTreeMap::new() };
+        let file = RobotFile {
+            source: SHIPPED_NAME.to_owned(),
+            text: SHIPPED.to_owned(),
+            meshes: BTreeMap::new(),
+            tool: None,
+            camera: None,
+        };
         Self::parse(&file, placement).expect("the shipped URDF file is sound")
     }
 
@@ -37,8 +41,8 @@ impl Arm {
     ///
     /// # Errors
     /// A file that is no URDF, missing meshes, joints of kinds or links that are not known, a loop, no tool link, shapes or
-    /// links without length, limits that are missing or the wrong way round: one line that names the file, its line and
-    /// the link or joint.
+    /// links without length, a hand without any shape, limits that are missing or the wrong way round: one line that
+    /// names the file, its line and the link or joint.
     pub fn placed(placement: &RobotPlacement) -> Result<Self> {
         match &placement.urdf {
             None => Ok(Self::standard(placement)),
@@ -74,14 +78,8 @@ impl<'r> Reader<'r> {
     }
 
     fn arm(&self, robot: &'r Description, placement: &RobotPlacement) -> Result<Arm> {
-        let Some(tool) = TOOL_LINKS.into_iter().find(|name| self.tree.links.contains_key(name)) else {
-            let message = format!(
-                "has no tool link: name the frame at the finger tip `{}` (z ahead, x along the broad side)",
-                TOOL_LINKS[0]
-            );
-            return Err(Error::input(self.path, "", message));
-        };
-        let camera = CAMERA_LINKS.into_iter().find(|name| self.tree.links.contains_key(name));
+        let tool = ends::tool(&self.tree, self.file.tool.as_deref(), self.path)?;
+        let camera_link = ends::camera(&self.tree, self.file.camera.as_deref(), self.path)?;
 
         // The moving joints from the root to the tool.
         let mut moving: Vec<&JointElement> = Vec::new();
@@ -109,10 +107,15 @@ impl<'r> Reader<'r> {
 
         let last = joints.len();
         let wrist = moving[last - 1].child.as_str();
+        let (camera, last_from_camera) = match camera_link.map(|(link, sure)| (link, sure, bodies[link])) {
+            Some((link, _, (body, from_camera))) if body == last => (Some(link), Some(from_camera)),
+            Some((link, true, _)) => return self.wrong_link(link, "the camera must be fixed to the hand"),
+            Some(_) | None => (None, None),
+        };
         let mut parts: Vec<Vec<Part>> = vec![Vec::new(); last + 1];
         for link in &robot.links {
             let (body, body_from_link) = bodies[link.at.name.as_str()];
-            // What is fixed to the last moving link is the gripper; so is the last link where nothing is.
+            // What is fixed to the last moving link is the gripper, and so is that link where it is the tool.
             let fixed_beyond = body == last && link.at.name != wrist && !self.tree.hangs_from(&link.at.name, camera);
             let role = if fixed_beyond || (body == last && tool == wrist) { Role::Tool } else { Role::Link };
             for shape in shapes::of_link(self.file, self.path, link, &body_from_link)? {
@@ -121,12 +124,16 @@ impl<'r> Reader<'r> {
                 parts[body].push(Part { link: link.at.name.clone(), role, shape, balls, around });
             }
         }
+        if !parts[last].iter().any(|part| part.role == Role::Tool) {
+            // Nothing is mounted: the last link itself pushes.
+            parts[last].iter_mut().filter(|part| part.link == wrist).for_each(|part| part.role = Role::Tool);
+        }
+        if !parts[last].iter().any(|part| part.role == Role::Tool) {
+            let message = "nothing from here to the tool has a collision shape or a visual that can be read: a push would \
+                           move nothing";
+            return self.wrong_link(wrist, message);
+        }
         let last_from_tool = bodies[tool].1;
-        let last_from_camera = match camera.map(|camera| bodies[camera]) {
-            Some((body, from_camera)) if body == last => Some(from_camera),
-            Some(_) => return self.wrong_link(camera.unwrap_or_default(), "the camera must be fixed to the hand"),
-            None => None,
-        };
         let mut arm = Arm {
             name: if robot.name.is_empty() { "robot".to_owned() } else { robot.name.clone() },
             reach_m: Joints::zero(last),
@@ -136,12 +143,16 @@ impl<'r> Reader<'r> {
             world_from_base: frame_of(&placement.world_from_base()),
             last_from_tool,
             last_from_camera,
+            tool_link: tool.to_owned(),
+            camera_link: camera.map(str::to_owned),
+            warnings: Vec::new(),
             self_pairs: Vec::new(),
             closed_form: None,
         };
         arm.reach_m = reaches(&arm);
         arm.closed_form = ThreeParallel::of(&arm);
         arm.self_pairs = self_pairs(&arm);
+        arm.warnings = warnings(robot, &moving, &arm);
         Ok(arm)
     }
 
@@ -186,8 +197,11 @@ impl<'r> Reader<'r> {
         if kind == JointKind::Turning && upper - lower > 4.0 * TAU {
             return wrong(format!("limits {lower} to {upper} rad: at most four turns are supported"));
         }
-        if !(joint.speed > 0.0 && joint.speed.is_finite()) {
-            return wrong(format!("velocity limit is {}; it must be above 0", joint.speed));
+        let Some(speed) = joint.speed else {
+            return wrong("has no velocity limit (limit velocity=\"...\", rad/s or m/s)".to_owned());
+        };
+        if !(speed > 0.0 && speed.is_finite()) {
+            return wrong(format!("velocity limit is {speed}; it must be above 0"));
         }
         let axis = Vector3::from(joint.axis);
         let Some(axis) = Unit::try_new(axis, 1e-9).filter(|axis| axis.iter().all(|v| v.is_finite())) else {
@@ -195,7 +209,7 @@ impl<'r> Reader<'r> {
         };
         let (_, body_from_parent) = bodies[joint.parent.as_str()];
         let parent_from_joint = body_from_parent * joint.parent_from_joint;
-        Ok(Joint { name: joint.at.name.clone(), kind, parent_from_joint, axis, lower, upper, speed: joint.speed })
+        Ok(Joint { name: joint.at.name.clone(), kind, parent_from_joint, axis, lower, upper, speed })
     }
 
     /// Two joints in a row that turn about one line have a link of no length between them.
@@ -217,3 +231,29 @@ impl<'r> Reader<'r> {
         Ok(())
     }
 }
+
+/// What a person should know of an arm that can be used all the same.
+fn warnings(robot: &Description, moving: &[&JointElement], arm: &Arm) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let has_shape = |link: &str| arm.parts().any(|(_, part)| part.link == link);
+    let names = |links: Vec<&str>| links.join(", ");
+    let drawn: Vec<&str> =
+        robot.links.iter().filter(|link| link.from_visuals).map(|link| link.at.name.as_str()).collect();
+    let (stand_in, unread): (Vec<&str>, Vec<&str>) = drawn.into_iter().partition(|link| has_shape(link));
+    if !stand_in.is_empty() {
+        warnings.push(format!("no collision shapes on {}: the visuals stand in for them", names(stand_in)));
+    }
+    if !unread.is_empty() {
+        let message = "no collision shapes, and visuals that cannot be read (.stl, .obj and .glb can), on";
+        warnings.push(format!("{message} {}: nothing meets these links", names(unread)));
+    }
+    let bare = arm.bodies.iter().skip(1).zip(moving).filter(|(parts, _)| parts.is_empty());
+    let bare: Vec<&str> = bare.map(|(_, joint)| joint.child.as_str()).collect();
+    if !bare.is_empty() {
+        warnings.push(format!("no shapes at all on what moves with {}: nothing meets it", names(bare)));
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests;

@@ -14,6 +14,7 @@
 //! ```
 
 use super::{Intrinsics, View, ViewArray, ViewId};
+use crate::fixed::{self, Fixed};
 use crate::{Error, Point, Pose, Result, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 use serde::Deserialize;
@@ -36,15 +37,18 @@ struct RawArray {
     #[expect(dead_code, reason = "for the reader of the file")]
     description: String,
     camera: Spanned<Intrinsics>,
-    layout: Spanned<[usize; 3]>,
+    layout: Spanned<Fixed<usize, 3>>,
     views: Vec<Spanned<RawView>>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawView {
+    #[serde(deserialize_with = "fixed::array")]
     position: [f32; 3],
+    #[serde(deserialize_with = "fixed::array")]
     target: [f32; 3],
+    #[serde(deserialize_with = "fixed::array")]
     slot: [u16; 3],
 }
 
@@ -100,7 +104,7 @@ impl ViewArray {
         }
         let camera = raw.camera.get_ref();
         check_camera(camera).map_err(|e| Error::input(path, line(raw.camera.span().start), e))?;
-        let layout = *raw.layout.get_ref();
+        let layout = raw.layout.get_ref().0;
         if layout.iter().any(|n| !(1..=1000).contains(n)) || layout.iter().product::<usize>() > usize::from(u16::MAX) {
             let place = line(raw.layout.span().start);
             return Err(Error::input(path, place, "layout must be three numbers from 1 to 1000, 65535 views in all"));
@@ -259,6 +263,11 @@ mod tests {
                 "x.toml: line 7, view 1: slot [0, 0, 0] is already view 0's",
             ),
             ("views = [", "views = ", "x.toml: line "),
+            ("[0, -0.2, 0.1]", "[0, -0.2, 0.1, 0]", "x.toml: line 6: 4 numbers where 3 are needed"),
+            ("[0, 0.2, 0.1]", "[0, 0.2]", "x.toml: line 6: 2 numbers where 3 are needed"),
+            ("slot = [0, 0, 0]", "slot = [0, 0, 0, 0]", "x.toml: line 6: 4 numbers where 3 are needed"),
+            ("[1, 1, 2]", "[1, 1, 2, 1]", "x.toml: line 4: 4 numbers where 3 are needed"),
+            ("[0.1, 1.5]", "[0.1, 1.5, 2]", "x.toml: line 3: 3 numbers where 2 are needed"),
         ];
         for (from, to, expected) in cases {
             let result = ViewArray::parse("x.toml", &good.replacen(from, to, 1));

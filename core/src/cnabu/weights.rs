@@ -3,7 +3,7 @@
 use super::Scored;
 use super::layout::LEVELS;
 use super::net::Network;
-use crate::files::{TEMPORARY, write_atomically};
+use crate::files::{target_of, temporary_of, write_atomically};
 use crate::scene::{CLASS_COUNT, Catalog};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -112,7 +112,7 @@ impl Card {
         Ok(card)
     }
 
-    /// Updates that the weights have behind them, as far as the card tells.
+    /// Number of updates that the weights were trained for, according to the card.
     pub fn updates(&self) -> u64 {
         self.training.get(UPDATES).and_then(|updates| updates.parse().ok()).unwrap_or(0)
     }
@@ -144,8 +144,8 @@ fn class_names() -> Vec<String> {
 /// # Errors
 /// When the disk does not take them; what was at `path` is still there then.
 pub fn write_tensors(path: &Path, tensors: &[(String, Tensor)]) -> Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = path.with_file_name(format!("{TEMPORARY}{name}"));
+    let path = &target_of(path)?;
+    let temporary = temporary_of(path);
     let written = Tensor::write_safetensors(tensors, &temporary)
         .map_err(|error| Error::input(path, "", format!("cannot be written: {error}")))
         .and_then(|()| std::fs::rename(&temporary, path).map_err(|error| Error::io(path, error)));

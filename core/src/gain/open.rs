@@ -1,14 +1,14 @@
 //! What pushes open: what can be seen after a push, from anywhere, that could not be seen before.
 //!
-//! A push is not worth it for the one look that follows: what was in view before can be looked at without it. It is worth
-//! it for the space that it opens to all views together, each voxel counted once:
-//! `sum_k H(p'_k) max(0, V'_k - max(V_k, S_k))` over voxels `k`, where `p'` is the predicted belief, `V_k` and `V'_k` tell
-//! whether any ray of any view reaches the voxel before and after the push, and `S_k` whether a look has seen it or it is
-//! believed to be free (`p < 0.05`): what a push makes uncertain of those is no gain.
+//! A push is not judged by the one look that follows: what was in view before can be looked at without it. It is worth
+//! the space that it opens to all views together, each voxel counted once: `sum_k H(p'_k) max(0, V'_k - max(V_k, S_k))`
+//! over voxels `k`, where `p'` is the predicted belief, `V_k` and `V'_k` tell whether any ray of any view reaches the
+//! voxel before and after the push, and `S_k` whether a look has seen it or it is believed to be free (`p < 0.05`):
+//! making those uncertain is no gain.
 //!
-//! A ray is taken to pass where the likeliest map is free (`p < 0.5`). Under the expected transmittance of
-//! [`super::gain_of_views`] a chamber that nobody has looked into closes itself after a few voxels of `p = 0.3`, so that
-//! opening it promises the same whether it is deep or shallow.
+//! A ray passes where the most likely map is free (`p < 0.5`). Under the expected transmittance of
+//! [`super::gain_of_views`] an unseen chamber would block every ray after a few voxels of `p = 0.3`, so that opening it
+//! would be worth the same whether it is deep or shallow.
 
 use super::RayDensity;
 use super::code::{LIKELIEST, Matter};
@@ -111,8 +111,8 @@ impl Openings {
     }
 }
 
-/// What looks from some views would tell together, nats, by the same count: each voxel once, where the likeliest map lets
-/// a ray reach it, and only what no look has seen.
+/// The gain of some views together, nats, counted in the same way: each unseen voxel once, if a ray reaches it through
+/// the most likely map.
 pub fn gain_together(field: &GainField, array: &ViewArray, ids: &[ViewId], density: RayDensity) -> f32 {
     let nothing;
     let open = match &field.seen {

@@ -1,4 +1,4 @@
-//! The card of a data directory: everything that its samples follow from.
+//! The card of a data directory: everything that determines its samples.
 
 use super::{Recipe, SAMPLES_PER_SHARD, Stretch, VIEWS};
 use crate::files::write_atomically;
@@ -52,12 +52,14 @@ pub struct Card {
     /// Name of the view array that they are drawn from.
     pub view_array: String,
     /// Numbers of voxels along x, y, z.
+    #[serde(deserialize_with = "crate::fixed::array")]
     pub dims: [usize; 3],
     /// Edge of a voxel, metres.
     pub voxel_m: f32,
     /// Classes by number, background last.
     pub classes: Vec<String>,
     /// Range of the floor share that objects cover.
+    #[serde(deserialize_with = "crate::fixed::array")]
     pub fill: [f32; 2],
     /// How strongly objects line up.
     pub rho: f32,
@@ -158,7 +160,7 @@ impl Card {
         write_atomically(&path, text.as_bytes())
     }
 
-    /// Refuses a directory that was begun with other settings; names the first that differs. The count may differ.
+    /// Refuses a directory that was started with other settings; names the first that differs. The count may differ.
     pub fn same_recipe(&self, other: &Self, directory: &Path) -> Result<()> {
         let settings = |card: &Self| {
             [

@@ -38,6 +38,7 @@ pub struct Stretch {
     /// Share of such samples.
     pub share: f32,
     /// Range of the factors.
+    #[serde(deserialize_with = "crate::fixed::array")]
     pub range: [f32; 2],
 }
 

@@ -2,20 +2,21 @@
 
 use super::file::Places;
 use super::overlap::PlacedBody;
-use super::{Body, Catalog, Object, Scene, Shelf, Warning};
+use super::{Body, Catalog, Object, Scene, Shelf, Warning, outline};
 use crate::Result;
+use crate::solid::Solid;
 
 /// Most voxels a scene's grid may have.
 pub const MAX_VOXELS: usize = 10_000_000;
 /// Most objects a scene may have.
 pub const MAX_OBJECTS: usize = 500;
-/// Shelf edges that are taken for a shelf, metres.
+/// Smallest and largest edge of a shelf, metres.
 const SHELF_EDGE_M: [f32; 2] = [0.05, 5.0];
-/// Voxel edges that are taken for a map, metres.
+/// Smallest and largest edge of a voxel, metres.
 const VOXEL_EDGE_M: [f32; 2] = [0.001, 0.05];
-/// Stretch factors that leave an object an object.
+/// Smallest and largest stretch factor of an object.
 const SCALE: [f32; 2] = [0.05, 20.0];
-/// Numbers beyond this are no positions (metres) of anything.
+/// Larger numbers are refused as positions, metres.
 const FAR_M: f32 = 100.0;
 /// Standing outside by this much, metres, is rounding.
 const ROUNDING_M: f32 = 0.000_5;
@@ -91,7 +92,26 @@ pub(super) fn check(scene: &Scene, catalog: &Catalog, places: &Places) -> Result
     if scene.objects.is_empty() {
         warnings.push("the scene has no objects".to_owned());
     }
+    let voxel_m = scene.shelf.voxel_m;
+    for (at, body) in bodies.iter().enumerate() {
+        let thickness = thickness_m(&body.solid);
+        if thickness < voxel_m {
+            warnings.push(format!(
+                "{} is {} thick, less than a voxel ({}): the map shows it one voxel thick",
+                places.name_object(scene, at),
+                millimetres(thickness),
+                millimetres(voxel_m)
+            ));
+        }
+    }
     Ok(warnings)
+}
+
+/// The smaller side of the footprint's smallest rectangle, or the height where that is less, metres.
+fn thickness_m(solid: &Solid) -> f32 {
+    let height = solid.bounds().size().z;
+    let rectangle = outline::smallest_rectangle(&solid.footprint());
+    rectangle.map_or(height, |rectangle| rectangle.size_m.iter().copied().fold(height, f32::min))
 }
 
 fn check_name(scene: &Scene, places: &Places) -> Result<()> {

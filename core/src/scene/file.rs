@@ -10,11 +10,14 @@
 //!
 //! [meshes]                          # optional: class = mesh file, relative to this file
 //! chips_can = "chips_can.obj"
+//! gum_tin = { file = "tin.stl", unit = "in" }   # m, dm, cm, mm, in or km; guessed from the size where it is left out
 //!
 //! [robot]                           # optional: the arm before the shelf
 //! base = [0.0, -0.70, -0.015]       # metres: origin of its base, as high as the table
 //! yaw_deg = 0.0                     # turn of the base about z
 //! urdf = "my_arm.urdf"              # an arm of one's own, relative to this file; else the UR5 that Nudge has
+//! tool = "my_tip_link"              # optional: its link at the finger tip, where that has no usual name
+//! camera = "my_lens_link"           # optional: its link of the camera in hand
 //!
 //! [[object]]
 //! class = "chips_can"
@@ -24,10 +27,14 @@
 //! mesh = "other_can.stl"            # optional: a shape of this object's own
 //! ```
 
-use super::mesh::load_mesh;
+mod raw_mesh;
+
+use super::mesh::{Unit, load_mesh};
 use super::{Catalog, MeshShape, Object, RobotFile, RobotPlacement, Scene, Shelf, Warning, check};
 use crate::files::write_atomically;
+use crate::fixed::Fixed;
 use crate::{Error, Result};
+use raw_mesh::RawMesh;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -49,7 +56,7 @@ struct RawScene {
     description: Option<Spanned<String>>,
     shelf: RawShelf,
     #[serde(default)]
-    meshes: BTreeMap<String, Spanned<String>>,
+    meshes: BTreeMap<String, Spanned<RawMesh>>,
     robot: Option<Spanned<RawRobot>>,
     #[serde(default)]
     object: Vec<Spanned<RawObject>>,
@@ -58,7 +65,7 @@ struct RawScene {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawShelf {
-    size: Spanned<[f64; 3]>,
+    size: Spanned<Fixed<f64, 3>>,
     voxel_m: Option<Spanned<f64>>,
     column_closure: Option<bool>,
 }
@@ -67,7 +74,9 @@ struct RawShelf {
 #[serde(deny_unknown_fields)]
 struct RawRobot {
     urdf: Option<Spanned<String>>,
-    base: Option<Spanned<[f64; 3]>>,
+    tool: Option<Spanned<String>>,
+    camera: Option<Spanned<String>>,
+    base: Option<Spanned<Fixed<f64, 3>>>,
     yaw_deg: Option<Spanned<f64>>,
 }
 
@@ -75,13 +84,13 @@ struct RawRobot {
 #[serde(deny_unknown_fields)]
 struct RawObject {
     class: Spanned<String>,
-    position: Spanned<[f64; 2]>,
+    position: Spanned<Fixed<f64, 2>>,
     yaw_deg: Option<Spanned<f64>>,
-    scale: Option<Spanned<[f64; 3]>>,
-    mesh: Option<Spanned<String>>,
+    scale: Option<Spanned<Fixed<f64, 3>>>,
+    mesh: Option<Spanned<RawMesh>>,
 }
 
-/// Only the format number, so that a file of another format is told so and not which of its keys are unknown here.
+/// Only the format number, so that the error for a file of another format names the format and not unknown keys.
 #[derive(Deserialize)]
 struct RawHead {
     format: Option<Spanned<toml::Value>>,
@@ -170,14 +179,18 @@ impl Scene {
         let mut shelf = Shelf::new(raw.shelf.size.get_ref().map(|v| v as f32));
         shelf.voxel_m = raw.shelf.voxel_m.map_or(shelf.voxel_m, |voxel| voxel.into_inner() as f32);
         shelf.column_closure = raw.shelf.column_closure.unwrap_or(shelf.column_closure);
+        // The unit of an object's own mesh, where it is named.
+        let mut units: Vec<Option<Unit>> = Vec::with_capacity(raw.object.len());
         let object = |raw: Spanned<RawObject>| {
             let raw = raw.into_inner();
+            let mesh = raw.mesh.map(Spanned::into_inner);
+            units.push(mesh.as_ref().and_then(|mesh| mesh.unit));
             Object {
                 class: raw.class.into_inner(),
                 position: raw.position.get_ref().map(|v| v as f32),
                 yaw_deg: raw.yaw_deg.map_or(0.0, |yaw| yaw.into_inner() as f32),
                 scale: raw.scale.map_or([1.0; 3], |scale| scale.get_ref().map(|v| v as f32)),
-                mesh: raw.mesh.map(Spanned::into_inner),
+                mesh: mesh.map(|mesh| mesh.file),
             }
         };
         let mut scene = Self {
@@ -194,7 +207,8 @@ impl Scene {
             let Some(known) = catalog.by_name(class) else {
                 return Err(places.mesh(class, check::unknown_class(catalog, class)));
             };
-            let mesh = load_mesh(&folder.join(file.get_ref()), file.get_ref(), Some(known));
+            let RawMesh { file, unit } = file.get_ref();
+            let mesh = load_mesh(&folder.join(file), file, Some(known), *unit);
             let (mesh, report) = mesh.map_err(|error| places.mesh(class, error.to_string()))?;
             warnings.extend(report.warnings.iter().map(|warning| format!("mesh of {class}: {warning}")));
             scene.meshes.insert(class.clone(), mesh);
@@ -204,25 +218,21 @@ impl Scene {
             if catalog.by_name(file).is_some() {
                 return Err(places.object(&scene, at, "mesh", format!("mesh `{file}` must be a file, not a class")));
             }
-            if scene.meshes.contains_key(file) {
+            if let Some(known) = scene.meshes.get(file) {
+                if known.unit != units[at] {
+                    let message = format!("mesh `{file}` is named with two units");
+                    return Err(places.object(&scene, at, "mesh", message));
+                }
                 continue;
             }
-            let (mesh, report) = load_mesh(&folder.join(file), file, catalog.by_name(&object.class))
+            let (mesh, report) = load_mesh(&folder.join(file), file, catalog.by_name(&object.class), units[at])
                 .map_err(|error| places.object(&scene, at, "mesh", error.to_string()))?;
             let name = name_object(at, &object.class);
             warnings.extend(report.warnings.iter().map(|warning| format!("mesh of {name}: {warning}")));
             scene.meshes.insert(file.clone(), mesh);
         }
         if let Some(robot) = raw.robot.map(Spanned::into_inner) {
-            let standard = RobotPlacement::default();
-            scene.robot = RobotPlacement {
-                base: robot.base.map_or(standard.base, |base| base.get_ref().map(|v| v as f32)),
-                yaw_deg: robot.yaw_deg.map_or(standard.yaw_deg, |yaw| yaw.into_inner() as f32),
-                urdf: robot
-                    .urdf
-                    .map(|file| RobotFile::read(&folder.join(file.get_ref()), file.get_ref()))
-                    .transpose()?,
-            };
+            scene.robot = placement(robot, folder, &places)?;
         }
         warnings.extend(check::check(&scene, catalog, &places)?);
         Ok((scene, warnings))
@@ -255,7 +265,7 @@ impl Scene {
             text.push_str("\n[meshes]\n");
         }
         for (class, mesh) in of_classes {
-            let _ = writeln!(text, "{class} = {}", quoted(&mesh.source));
+            let _ = writeln!(text, "{class} = {}", raw_mesh::to_toml(&mesh.source, mesh.unit));
         }
         let (robot, standard) = (&self.robot, RobotPlacement::default());
         if *robot != standard {
@@ -265,6 +275,11 @@ impl Scene {
             }
             if let Some(file) = &robot.urdf {
                 let _ = writeln!(text, "urdf = {}", quoted(&file.source));
+                for (key, link) in [("tool", &file.tool), ("camera", &file.camera)] {
+                    if let Some(link) = link {
+                        let _ = writeln!(text, "{key} = {}", quoted(link));
+                    }
+                }
             }
         }
         for object in &self.objects {
@@ -276,7 +291,8 @@ impl Scene {
                 let _ = writeln!(text, "scale = {:?}", object.scale);
             }
             if let Some(mesh) = &object.mesh {
-                let _ = writeln!(text, "mesh = {}", quoted(mesh));
+                let unit = self.meshes.get(mesh).and_then(|shape| shape.unit);
+                let _ = writeln!(text, "mesh = {}", raw_mesh::to_toml(mesh, unit));
             }
         }
         text
@@ -295,6 +311,30 @@ impl Scene {
         }
         write_atomically(path, self.to_toml().as_bytes())
     }
+}
+
+/// The arm of a scene's `[robot]`.
+fn placement(robot: RawRobot, folder: &Path, places: &Places) -> Result<RobotPlacement> {
+    let standard = RobotPlacement::default();
+    let mut urdf = robot.urdf.map(|file| RobotFile::read(&folder.join(file.get_ref()), file.get_ref())).transpose()?;
+    match &mut urdf {
+        Some(file) => {
+            file.tool = robot.tool.map(Spanned::into_inner);
+            file.camera = robot.camera.map(Spanned::into_inner);
+        }
+        None => {
+            if let Some((key, _)) = [("tool", &robot.tool), ("camera", &robot.camera)].iter().find(|(_, l)| l.is_some())
+            {
+                let message = format!("{key} names a link of an arm of one's own, and no urdf is named");
+                return Err(places.key(&format!("robot.{key}"), message));
+            }
+        }
+    }
+    Ok(RobotPlacement {
+        base: robot.base.map_or(standard.base, |base| base.get_ref().map(|v| v as f32)),
+        yaw_deg: robot.yaw_deg.map_or(standard.yaw_deg, |yaw| yaw.into_inner() as f32),
+        urdf,
+    })
 }
 
 /// The folder that a file lies in.
@@ -340,6 +380,8 @@ fn lines(raw: &RawScene, text: &str) -> BTreeMap<String, usize> {
             ("base", robot.base.as_ref().map(Spanned::span)),
             ("yaw_deg", robot.yaw_deg.as_ref().map(Spanned::span)),
             ("urdf", robot.urdf.as_ref().map(Spanned::span)),
+            ("tool", robot.tool.as_ref().map(Spanned::span)),
+            ("camera", robot.camera.as_ref().map(Spanned::span)),
         ];
         for (key, span) in spans {
             if let Some(span) = span {

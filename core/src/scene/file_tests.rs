@@ -238,6 +238,51 @@ fn meshes_replace_shapes_by_class_and_by_object() {
 }
 
 #[test]
+fn a_scene_names_the_unit_of_a_mesh() {
+    let folder = tempfile::tempdir().expect("folder");
+    let cube = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+                f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    std::fs::write(folder.path().join("cube.obj"), cube).expect("write");
+    let path = folder.path().join("scene.toml");
+    let named = |unit: &str| format!("{{ file = \"cube.obj\", unit = \"{unit}\" }}");
+    let text = |of_class: &str, of_object: &str| {
+        let own = object("cereal_box", &format!("position = [0.2, 0.2]\nmesh = {of_object}"));
+        format!("{HEAD}[meshes]\nmilk_carton = {of_class}\n{}{own}", object("milk_carton", "position = [0.0, 0.2]"))
+    };
+    let catalog = Catalog::standard();
+    let load = |text: String| {
+        std::fs::write(&path, text).expect("write");
+        Scene::load(&path, &catalog)
+    };
+    let (scene, warnings) = load(text(&named("dm"), &named("in"))).expect("scene");
+    assert_eq!(warnings, Vec::<String>::new());
+    for (body, edge) in scene.bodies(&catalog).expect("bodies").iter().zip([0.1, 0.0254]) {
+        assert!((body.solid.bounds().size() - Vector::repeat(edge)).norm() < 1e-6);
+    }
+    assert_eq!(load(scene.to_toml()).expect("again").0, scene, "{}", scene.to_toml());
+    let message = load(text(&named("parsec"), &named("in"))).expect_err("no unit").to_string();
+    assert!(message.contains("line 6") && message.contains("parsec") && message.contains("`mm`"), "{message}");
+    let twice = text(&named("dm"), &named("in")) + &object("gum_tin", "position = [-0.2, 0.2]\nmesh = \"cube.obj\"");
+    let message = load(twice).expect_err("two units").to_string();
+    assert!(message.contains("object 3 (gum_tin)") && message.contains("two units"), "{message}");
+}
+
+#[test]
+fn numbers_beyond_an_arrays_end_are_no_longer_dropped() {
+    let refused = |text: &str| parse(text).map(|_| ()).expect_err(text).to_string();
+    let can = |lines: &str| format!("{HEAD}{}", object("tomato_can", lines));
+    let message = refused(&can("position = [0.1, 0.2, 0.15]"));
+    assert!(message.contains("object 1 (tomato_can)") && message.contains("3 numbers where 2 are needed"), "{message}");
+    let message = refused(&can("position = [0,1, 0,2]"));
+    assert!(message.contains("4 numbers where 2 are needed") && message.contains("decimal mark"), "{message}");
+    assert!(refused(&can("position = [0.1, 0.2]\nscale = [1, 1, 1, 2]")).contains("4 numbers where 3 are needed"));
+    let message = refused(&HEAD.replace("0.4]", "0.4, 0.4]"));
+    assert!(message.contains("line 4") && message.contains("4 numbers where 3 are needed"), "{message}");
+    let message = refused(&format!("{HEAD}[robot]\nbase = [0, -0.7, 0, 0]\n"));
+    assert!(message.contains("4 numbers where 3 are needed"), "{message}");
+}
+
+#[test]
 fn the_scene_of_scanned_objects_loads() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/ycb/shelf.toml");
     if !path.exists() {

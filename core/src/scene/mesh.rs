@@ -3,27 +3,31 @@
 //! Connected components that are convex are taken as given convex parts; others are decomposed by V-HACD (Mamou and
 //! Ghorbel 2009). A mesh keeps its own direction about z; [`MeshReport::footprint`] tells by how much it is turned.
 
+mod glb;
+mod obj;
 mod parts;
 mod read;
+mod stl;
+mod text;
 mod topology;
+mod unit;
 
 use super::outline::{self, Rectangle};
 use super::{Class, MeshShape, Warning};
 use crate::solid::{Bounds, ConvexPart, Solid};
+use crate::wall::guarded;
 use crate::{Error, Point, Result};
+use read::Corner;
 use serde::Serialize;
 use std::path::Path;
+use topology::{Component, Fault};
 
 pub use parts::MAX_PART_VERTICES;
 pub use read::MAX_TRIANGLES;
+pub use unit::Unit;
 
 /// Density of a mesh whose class is not known: packed groceries, kg per cubic metre.
 const ESTIMATED_DENSITY: f32 = 400.0;
-/// Largest edges that are taken for metres as they are.
-const PLAUSIBLE_EDGE_M: [f32; 2] = [0.005, 3.0];
-/// Largest edges that another unit must give to be believed.
-const LIKELY_EDGE_M: [f32; 2] = [0.02, 1.0];
-
 /// How the convex parts of a mesh were obtained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -43,7 +47,9 @@ pub struct MeshReport {
     pub file: String,
     /// The class that it stands for, when one was named.
     pub class: Option<String>,
-    /// Metres per unit of the file: 1 unless the numbers cannot be metres.
+    /// The file's unit: the one that was named, else metres unless the numbers cannot be that.
+    pub unit: Unit,
+    /// Metres per unit of the file.
     pub metres_per_unit: f32,
     /// Triangles in the file.
     pub triangles: usize,
@@ -75,47 +81,73 @@ pub struct MeshReport {
 
 /// All corners of a mesh file (OBJ, STL, GLB) as they are in the file: for who only needs its hull.
 pub(crate) fn read_mesh_points(path: &Path) -> Result<Vec<Point>> {
-    Ok(read::read(path)?.into_iter().flat_map(|group| group.points).collect())
+    Ok(read::read(path)?.into_iter().flat_map(|group| group.points).map(|point| point.cast()).collect())
 }
 
 /// Reads a mesh (OBJ, STL, GLB) and makes a shape of it, with a report of what was done.
 ///
-/// `source` is what the shape notes as its file (relative to a scene); `class` gives mass and helps to tell units.
+/// `source` is what the shape notes as its file (relative to a scene); `class` gives the mass. Without a `unit` it is
+/// guessed, and `class` helps.
 ///
 /// # Errors
 /// A file that cannot be read, is no mesh, is empty, open, larger than [`MAX_TRIANGLES`], flat, or has numbers that are
 /// not finite.
-pub fn load_mesh(path: &Path, source: &str, class: Option<&Class>) -> Result<(MeshShape, MeshReport)> {
+pub fn load_mesh(
+    path: &Path,
+    source: &str,
+    class: Option<&Class>,
+    unit: Option<Unit>,
+) -> Result<(MeshShape, MeshReport)> {
     let wrong = |message: String| Error::input(path, "", message);
-    let mut groups = read::read(path)?;
+    let groups = read::read(path)?;
     let triangles: usize = groups.iter().map(|group| group.triangles.len()).sum();
-    let Some(bounds) = read::bounds(&groups) else {
+    let Some([low, high]) = read::bounds(&groups) else {
         return Err(wrong("the mesh is empty (no triangles)".into()));
     };
     let mut warnings = Vec::new();
-    let edge = bounds.size().max();
-    let metres_per_unit = metres_per_unit(edge, class).ok_or_else(|| {
+    let edge = (high - low).max();
+    let expected = class.map(|class| f64::from(class.solid.bounds().size().max()));
+    let file_unit = unit.or_else(|| Unit::guess(edge, expected)).ok_or_else(|| {
         wrong(format!("the largest edge is {edge} in the file's units, which is no object in any of m, cm, mm, inches"))
     })?;
-    if metres_per_unit != 1.0 {
+    if unit.is_none() && file_unit != Unit::Metre {
         warnings.push(format!(
-            "not in metres: the largest edge of {edge} was read as {} ({:.3} m)",
-            unit_name(metres_per_unit),
-            edge * metres_per_unit
+            "not in metres: the largest edge of {} was read as {} ({:.3} m); say which unit it is if that is wrong",
+            (edge * 1e5).round() / 1e5,
+            file_unit.name(),
+            edge * file_unit.metres()
         ));
-        for point in groups.iter_mut().flat_map(|group| &mut group.points) {
-            point.coords *= metres_per_unit;
-        }
     }
+    // About its own middle: far from its origin a mesh would lose all digits.
+    let middle = nalgebra::center(&low, &high);
+    let metres = |point: &Corner| Point::from(((point - middle) * file_unit.metres()).cast::<f32>());
+    let surfaces: Vec<Component> = groups
+        .into_iter()
+        .map(|group| Component { points: group.points.iter().map(metres).collect(), triangles: group.triangles })
+        .collect();
 
-    let topology = topology::components(&groups).map_err(wrong)?;
+    let topology = topology::components(&surfaces).map_err(|fault| match fault {
+        Fault::Open { edges, first } if ConvexPart::hull(&corners_of(&surfaces)).is_some() => {
+            let first = middle + first.coords.cast::<f64>() / file_unit.metres();
+            wrong(format!(
+                "the mesh is open: {edges} edges have a triangle on one side only, the first at ({:.4}, {:.4}, {:.4}); \
+                 close its holes",
+                first.x, first.y, first.z
+            ))
+        }
+        Fault::Open { .. } => wrong("the mesh is flat: all its corners lie in one plane".into()),
+        Fault::Flat => wrong("the mesh is flat: every triangle has shrunk to a line".into()),
+    })?;
+    if topology.repeated > 0 {
+        warnings.push(format!("{} triangles are there twice and count once", topology.repeated));
+    }
     if topology.turned > 0 {
         warnings.push(format!("{} triangles were wound the wrong way and were turned", topology.turned));
     }
     if topology.cavities > 0 {
         warnings.push(format!("{} closed cavities inside were filled", topology.cavities));
     }
-    let split = parts::convex_parts(&topology.components);
+    let split = guarded(|| Ok(parts::convex_parts(&topology.components))).map_err(wrong)?;
     if split.parts.is_empty() {
         return Err(wrong("the mesh is flat: it encloses no volume".into()));
     }
@@ -132,7 +164,8 @@ pub fn load_mesh(path: &Path, source: &str, class: Option<&Class>) -> Result<(Me
     let report = MeshReport {
         file: path.display().to_string(),
         class: class.map(|class| class.name.clone()),
-        metres_per_unit,
+        unit: file_unit,
+        metres_per_unit: file_unit.metres() as f32,
         triangles,
         vertices: topology.components.iter().map(|component| component.points.len()).sum(),
         components: topology.components.len(),
@@ -148,7 +181,12 @@ pub fn load_mesh(path: &Path, source: &str, class: Option<&Class>) -> Result<(Me
         warnings,
     };
     let corners = |part: &ConvexPart| part.vertices.iter().map(|p| [p.x, p.y, p.z]).collect();
-    Ok((MeshShape { source: source.to_owned(), parts: solid.parts.iter().map(corners).collect() }, report))
+    Ok((MeshShape { source: source.to_owned(), unit, parts: solid.parts.iter().map(corners).collect() }, report))
+}
+
+/// All corners of some surfaces.
+fn corners_of(surfaces: &[Component]) -> Vec<Point> {
+    surfaces.iter().flat_map(|surface| surface.points.iter().copied()).collect()
 }
 
 /// Moves a solid so that the centre of its footprint is the origin and it stands on the board.
@@ -162,34 +200,6 @@ fn centre(solid: &mut Solid, center: [f32; 2]) {
         for plane in &mut part.planes {
             plane.offset += plane.normal.dot(&shift);
         }
-    }
-}
-
-/// What one unit of the file must be, judged by the largest edge: metres where that is plausible; else the unit that
-/// comes near the class's size; else millimetres, centimetres, or metres that someone divided by a thousand.
-fn metres_per_unit(edge: f32, class: Option<&Class>) -> Option<f32> {
-    let within = |factor: &f32, [low, high]: [f32; 2]| (low..=high).contains(&(edge * factor));
-    if within(&1.0, PLAUSIBLE_EDGE_M) {
-        return Some(1.0);
-    }
-    let units = [0.001, 0.01, 0.0254, 1000.0];
-    let of_class = class.and_then(|class| {
-        let expected = class.solid.bounds().size().max();
-        let misfit = |factor: &f32| (edge * factor / expected).ln().abs();
-        let best = units.into_iter().min_by(|a, b| misfit(a).total_cmp(&misfit(b)))?;
-        (misfit(&best) < std::f32::consts::LN_2).then_some(best)
-    });
-    of_class
-        .or_else(|| [0.001, 0.01, 1000.0].into_iter().find(|factor| within(factor, LIKELY_EDGE_M)))
-        .or_else(|| within(&0.001, PLAUSIBLE_EDGE_M).then_some(0.001))
-}
-
-fn unit_name(metres_per_unit: f32) -> &'static str {
-    match metres_per_unit {
-        0.001 => "millimetres",
-        0.01 => "centimetres",
-        0.0254 => "inches",
-        _ => "kilometres",
     }
 }
 

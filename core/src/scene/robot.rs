@@ -67,9 +67,16 @@ pub struct RobotFile {
     pub source: String,
     /// The file's text.
     pub text: String,
-    /// Corners of the convex hull of each collision mesh, in the mesh file's own unit, by the name that the text gives it.
+    /// Corners of the convex hull of each collision mesh, in the mesh file's own unit, by the name that the text gives it;
+    /// of a link without collision shapes those of its visuals, as far as they can be read.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub meshes: BTreeMap<String, Vec<[f32; 3]>>,
+    /// The link at the finger tip, where it was named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<String>,
+    /// The link of the camera in hand, where it was named.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
 }
 
 impl RobotFile {
@@ -87,30 +94,62 @@ impl RobotFile {
         let text = String::from_utf8(bytes).map_err(|_| Error::input(path, "", "not a URDF file (not UTF-8 text)"))?;
         let document = xml(&text, path)?;
         let mut meshes = BTreeMap::new();
-        let named = document
-            .descendants()
-            .filter(|node| node.has_tag_name("mesh") && node.ancestors().any(|above| above.has_tag_name("collision")));
-        for node in named {
+        for node in document.descendants().filter(|node| node.has_tag_name("mesh")) {
             let Some(name) = node.attribute("filename") else { continue };
-            let wrong = |message: String| Error::input(path, mesh_place(&document, &node), message);
-            let file = find(path, name).ok_or_else(|| wrong(format!("mesh `{name}` is not there")))?;
-            let points = read_mesh_points(&file).map_err(|error| wrong(error.to_string()))?;
-            let hull = ConvexPart::hull(&points).ok_or_else(|| wrong(format!("mesh `{name}` has no volume")))?;
-            meshes.insert(name.to_owned(), hull.vertices.iter().map(|p| p.coords.into()).collect());
+            let inside = |tag: &str| node.ancestors().any(|above| above.has_tag_name(tag));
+            let stands_in = inside("visual") && node.ancestors().any(|above| has_only_visuals(&above));
+            if !(inside("collision") || stands_in) {
+                continue;
+            }
+            match hull_of(path, name) {
+                Ok(hull) => {
+                    meshes.insert(name.to_owned(), hull);
+                }
+                // A picture's format need not be read here; who uses the arm is told which link has no shape.
+                Err(_) if stands_in => {}
+                Err(message) => return Err(Error::input(path, mesh_place(&document, &node), message)),
+            }
         }
-        Ok(Self { source: source.into(), text, meshes })
+        Ok(Self { source: source.into(), text, meshes, tool: None, camera: None })
     }
 }
 
+/// Whether a node is a link that has visuals and no collision shapes.
+pub(crate) fn has_only_visuals(link: &Node<'_, '_>) -> bool {
+    let has = |tag: &str| link.children().any(|child| child.has_tag_name(tag));
+    link.has_tag_name("link") && has("visual") && !has("collision")
+}
+
+/// Corners of the convex hull of a mesh that a URDF file names.
+fn hull_of(urdf: &Path, name: &str) -> std::result::Result<Vec<[f32; 3]>, String> {
+    let file = find(urdf, name).ok_or_else(|| format!("mesh `{name}` is not there"))?;
+    let points = read_mesh_points(&file).map_err(|error| error.to_string())?;
+    let hull = ConvexPart::hull(&points).ok_or_else(|| format!("mesh `{name}` has no volume"))?;
+    Ok(hull.vertices.iter().map(|p| p.coords.into()).collect())
+}
+
+/// What to say of a URDF file in the making.
+const XACRO: &str = "is a xacro file: turn it into URDF first, for example with `xacro arm.urdf.xacro > arm.urdf`";
+
 /// A URDF file's text as a tree.
 pub(crate) fn xml<'t>(text: &'t str, path: &Path) -> Result<Document<'t>> {
-    Document::parse(text).map_err(|error| {
+    let document = Document::parse(text).map_err(|error| {
+        let place = format!("line {}", error.pos().row);
+        if matches!(error, roxmltree::Error::UnknownNamespace(..)) && text.contains("<xacro:") {
+            return Error::input(path, place, XACRO);
+        }
         let words = error.to_string();
         // The place is named apart from the words.
         let words = words.rsplit_once(" at ").map_or(words.as_str(), |(words, _)| words);
-        let place = format!("line {}", error.pos().row);
         Error::input(path, place, format!("not a URDF file that can be read: {words}"))
-    })
+    })?;
+    // What is left of it in a finished file is at most the name of its namespace.
+    let of_xacro = |node: &Node<'_, '_>| node.tag_name().namespace().is_some_and(|name| name.contains("xacro"));
+    if let Some(node) = document.descendants().find(of_xacro) {
+        let place = format!("line {}", document.text_pos_at(node.range().start).row);
+        return Err(Error::input(path, place, XACRO));
+    }
+    Ok(document)
 }
 
 fn mesh_place(document: &Document<'_>, node: &Node<'_, '_>) -> String {
@@ -167,8 +206,22 @@ mod tests {
         std::fs::write(&urdf, text("no/such.stl")).expect("urdf");
         let message = RobotFile::read(&urdf, "arm.urdf").expect_err("no mesh").to_string();
         assert!(message.ends_with("arm.urdf: line 3, link a: mesh `no/such.stl` is not there"), "{message}");
+        let text = |name: &str| text(name).replace("collision", "visual");
+        std::fs::write(&urdf, text("package://some_arm/meshes/box.obj")).expect("urdf");
+        assert_eq!(RobotFile::read(&urdf, "arm.urdf").expect("readable").meshes.len(), 1, "what is drawn stands in");
+        std::fs::write(&urdf, text("no/such.dae")).expect("urdf");
+        assert_eq!(RobotFile::read(&urdf, "arm.urdf").expect("only a picture").meshes.len(), 0);
         std::fs::write(&urdf, "<robot>\n<link").expect("urdf");
         let message = RobotFile::read(&urdf, "arm.urdf").expect_err("no XML").to_string();
         assert!(message.contains("arm.urdf: line 1: not a URDF file"), "{message}");
+    }
+
+    #[test]
+    fn a_xacro_file_is_called_one_and_not_an_arm_without_links() {
+        let told = |text: &str| xml(text, Path::new("arm.urdf.xacro")).map(|_| ()).map_err(|error| error.to_string());
+        let named = "<robot xmlns:xacro=\"http://www.ros.org/wiki/xacro\" name=\"a\">\n<xacro:arm/>\n</robot>";
+        assert!(told(named).is_err_and(|m| m.starts_with("arm.urdf.xacro: line 2: is a xacro file")));
+        assert!(told("<robot>\n<xacro:arm/>\n</robot>").is_err_and(|m| m.contains("line 2: is a xacro file")));
+        assert_eq!(told(&named.replace("<xacro:arm/>", "<!-- <xacro:arm/> -->")), Ok(()), "a finished file");
     }
 }

@@ -25,11 +25,13 @@ pub enum Shape {
     /// A box.
     Box {
         /// Size along x, y, z.
+        #[serde(deserialize_with = "crate::fixed::array")]
         size_m: [f32; 3],
     },
     /// A box with rounded upright edges.
     RoundedBox {
         /// Size along x, y, z.
+        #[serde(deserialize_with = "crate::fixed::array")]
         size_m: [f32; 3],
         /// Radius of the upright edges.
         corner_radius_m: f32,
@@ -37,6 +39,7 @@ pub enum Shape {
     /// A body of oval section, a shoulder that tapers, and a round neck.
     Bottle {
         /// Outer size along x, y, z.
+        #[serde(deserialize_with = "crate::fixed::array")]
         size_m: [f32; 3],
         /// Height where the body ends and the shoulder begins.
         body_m: f32,
@@ -48,6 +51,7 @@ pub enum Shape {
     /// A drink carton: upright walls, two roof faces, and the upright seal on their ridge, along x.
     Carton {
         /// Outer size along x, y, z.
+        #[serde(deserialize_with = "crate::fixed::array")]
         size_m: [f32; 3],
         /// Height of the walls.
         walls_m: f32,

@@ -1,4 +1,4 @@
-//! What became of each object: found, misclassified, not found; and objects that were made up.
+//! The verdict on each object: found, misclassified, not found; and hallucinated objects.
 //!
 //! A floor cell *shows an object* when a voxel of its column in the scored volume is believed occupied (`p > 0.5`). Its
 //! class counts when one class is likelier than every other; a tie (no label seen yet) is no class.
@@ -15,8 +15,8 @@ pub const SPECK_M2: f32 = 6e-4;
 
 /// The verdict on every object that stands on the board, in the scene's order, and then on every hallucinated one.
 ///
-/// An object is judged over the floor cells where it is the tallest; one without such cells has no verdict, nor has one
-/// that was dropped. A hallucinated object is a connected patch (4 neighbours) of cells that show one object class, at
+/// An object is judged over the floor cells where it is the tallest (one thinner than a voxel over those that it touches);
+/// one that stands wholly under another has no verdict, nor has one that was dropped. A hallucinated object is a connected patch (4 neighbours) of cells that show one object class, at
 /// least [`SPECK_M2`] large, of which most lie where no object stands and which does not cover most of any object.
 pub fn object_verdicts(belief: &Belief, truth: &TruthMap, catalog: &Catalog) -> Vec<ObjectVerdict> {
     let shown = shown_classes(belief);

@@ -1,4 +1,7 @@
 //! The ground truth map of a scene: its bodies voxelised.
+//!
+//! A voxel is occupied where its centre is inside a body. A body that has no centre inside, because it is thinner than a
+//! voxel, is taken to fill every voxel that it touches: so it is there for the map, for the scores, and for a verdict.
 
 use crate::grid::Grid;
 use crate::scene::{BACKGROUND, Body};
@@ -37,9 +40,63 @@ impl TruthMap {
         columns.zip(tops).map(|((a, b), (top_a, top_b))| a != b || top_a != top_b).collect()
     }
 
-    /// Voxelises bodies exactly: point in shape at voxel centres. Where two bodies reach the same level of a column,
-    /// its label is the earlier one's.
+    /// Voxelises bodies exactly: point in shape at voxel centres; a body without any, by the voxels that it touches.
+    /// Where two bodies reach the same level of a column, its label is the earlier one's.
     pub fn of(grid: &Grid, bodies: &[Body]) -> Self {
+        let mut truth = Self::of_centers(grid, bodies);
+        let mut is_there = vec![false; bodies.iter().map(|body| usize::from(body.id.0) + 1).max().unwrap_or(0)];
+        for object in truth.objects.iter().filter(|object| **object != u16::MAX) {
+            is_there[usize::from(*object)] = true;
+        }
+        for body in bodies.iter().filter(|body| !is_there[usize::from(body.id.0)]) {
+            truth.add_if_thin(grid, body);
+        }
+        truth
+    }
+
+    /// Adds a body whose parts have no voxel's centre inside. Of the cells that it touches it names those where nothing
+    /// is taller, or all where there is none of these.
+    fn add_if_thin(&mut self, grid: &Grid, body: &Body) {
+        let mut parts = placed_parts(grid, std::slice::from_ref(body));
+        let [_, depth, height] = self.dims;
+        let columns = |parts: &[PlacedPart]| {
+            let mut columns = Vec::new();
+            for part in parts {
+                for x in part.x.clone() {
+                    let cells = part.y.clone().map(|y| x * depth + y);
+                    let levels = cells.map(|cell| (cell, levels_inside(grid, cell, &part.faces)));
+                    columns.extend(levels.filter(|(_, levels)| !levels.is_empty()));
+                }
+            }
+            columns
+        };
+        if !columns(&parts).is_empty() {
+            // Something stands over it.
+            return;
+        }
+        for face in parts.iter_mut().flat_map(|part| &mut part.faces) {
+            // A face moved out by this much has the centres of all voxels inside that it cuts.
+            face.offset += 0.5 * grid.voxel_m * face.normal.abs().sum();
+        }
+        let touched = columns(&parts);
+        let top = |cell: usize| self.occupancy[cell * height..(cell + 1) * height].iter().rposition(|o| *o == 1);
+        let mut named: Vec<usize> = touched
+            .iter()
+            .filter(|(cell, levels)| top(*cell).is_none_or(|top| top < levels.end))
+            .map(|(c, _)| *c)
+            .collect();
+        if named.is_empty() {
+            named = touched.iter().map(|(cell, _)| *cell).collect();
+        }
+        for cell in named {
+            (self.labels[cell], self.objects[cell]) = (body.class.0, body.id.0);
+        }
+        for (cell, levels) in touched {
+            self.occupancy[cell * height..(cell + 1) * height][levels].fill(1);
+        }
+    }
+
+    fn of_centers(grid: &Grid, bodies: &[Body]) -> Self {
         let parts = placed_parts(grid, bodies);
         let [width, depth, height] = grid.dims;
         let mut truth = Self {
@@ -164,6 +221,32 @@ mod tests {
             assert_eq!((truth.labels[at(0.05, 0.2)], truth.objects[at(0.05, 0.2)]), (1, 4));
             assert_eq!((truth.labels[at(0.3, 0.2)], truth.objects[at(0.3, 0.2)]), (14, u16::MAX));
         }
+    }
+
+    #[test]
+    fn a_body_thinner_than_a_voxel_fills_what_it_touches() {
+        let grid = grid();
+        let sheet = |id: u16, y: f32| {
+            body(id, 11, Solid::standing_box(Vector::new(0.10, 0.001, 0.10)), Pose::translation(0.0, y, 0.0))
+        };
+        // Between two rows of centres, where no centre is inside.
+        let truth = TruthMap::of(&grid, &[sheet(0, 0.2)]);
+        let cells: Vec<usize> = (0..truth.objects.len()).filter(|cell| truth.objects[*cell] == 0).collect();
+        assert!((20..=2 * 22).contains(&cells.len()), "{} cells", cells.len());
+        assert!(cells.iter().all(|cell| truth.labels[*cell] == 11));
+        let column = grid.column(cells[0]);
+        let tall = truth.occupancy[column].iter().filter(|o| **o == 1).count();
+        assert!((20..=21).contains(&tall), "{tall} levels");
+        // A taller body beside it keeps its own cells; the sheet still has some.
+        let tower = body(1, 2, Solid::standing_box(Vector::new(0.10, 0.05, 0.2)), Pose::translation(0.0, 0.2256, 0.0));
+        let alone = TruthMap::of(&grid, std::slice::from_ref(&tower));
+        let both = TruthMap::of(&grid, &[sheet(0, 0.2), tower]);
+        let of = |truth: &TruthMap, object: u16| truth.objects.iter().filter(|o| **o == object).count();
+        assert!(of(&both, 0) > 0 && of(&both, 1) == of(&alone, 1), "{} {}", of(&both, 0), of(&both, 1));
+        // What is inside another body altogether has voxels and no cells, as before.
+        let inner = body(2, 3, Solid::standing_box(Vector::new(0.05, 0.05, 0.05)), Pose::translation(0.2, 0.2, 0.0));
+        let outer = body(3, 4, Solid::standing_box(Vector::new(0.10, 0.10, 0.10)), Pose::translation(0.2, 0.2, 0.0));
+        assert_eq!(of(&TruthMap::of(&grid, &[inner, outer]), 2), 0);
     }
 
     proptest! {

@@ -249,9 +249,9 @@ impl App {
             belief: form.belief.clone(),
             seed: form.seed,
             budget: form.budget.max(1),
-            views: "standard300".to_owned(),
+            views: form.views.trim().to_owned(),
             planner: form.planner,
-            noise: None,
+            noise: form.noise,
         };
         let out = self.free_directory(&scene, &config, "");
         let title = format!("{}, {}, seed {}", scene.name, config.policy, config.seed);

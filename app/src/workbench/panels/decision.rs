@@ -172,13 +172,17 @@ fn because(reason: Reason, policy: PolicyKind, planner: &PlannerSettings) -> Str
         count => format!("nothing is pushed in the {which} {count} steps"),
     };
     match reason {
-        Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore | Reason::MapComplete => {
-            words::reason(reason).to_owned()
-        }
+        Reason::LookTellsMore
+        | Reason::PushTellsLittle
+        | Reason::PushTellsMore
+        | Reason::PushReveals
+        | Reason::MapComplete => words::reason(reason).to_owned(),
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
         Reason::TooEarly => steps("first", planner.quiet_steps),
         Reason::LastStep => steps("last", planner.closing_steps),
-        Reason::JustPushed if policy == PolicyKind::Mem && planner.closing_steps > 1 => {
+        Reason::JustPushed
+            if matches!(policy, PolicyKind::Mem | PolicyKind::ClairvoyantPush) && planner.closing_steps > 1 =>
+        {
             format!("{} looks follow a push before the next one", planner.closing_steps)
         }
         Reason::JustPushed => "nothing is pushed right after a push".to_owned(),

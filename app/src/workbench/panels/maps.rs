@@ -160,7 +160,7 @@ fn map(
     if let Some(cell) = drawn.chosen {
         ask.push(Command::Pick(Some(Picked::Cell(cell))));
     }
-    map_legend(ui, shown, &grid);
+    map_legend(ui, shown, &grid, session.record.config.planner.certain);
 }
 
 fn unknown(grid: &Grid) -> egui::ColorImage {
@@ -189,7 +189,8 @@ fn title(shown: Shown, grid: &Grid) -> (String, &'static str) {
     }
 }
 
-fn map_legend(ui: &mut Ui, shown: Shown, grid: &Grid) {
+/// `certain` is the probability above which a cell counts as known.
+fn map_legend(ui: &mut Ui, shown: Shown, grid: &Grid, certain: f32) {
     let bar = |ui: &mut Ui, map: Colormap, name: &str, high: String, unit: &str, hint: &str| {
         legend::bar(ui, &Bar { name, ends: ["0".to_owned(), high], unit, hint }, |t| map.rgb(t));
     };
@@ -198,14 +199,8 @@ fn map_legend(ui: &mut Ui, shown: Shown, grid: &Grid) {
             bar(ui, Colormap::Viridis, "occupancy", "1".into(), "probability", "Probability that the voxel is occupied")
         }
         Shown::Map(MapKind::Certainty) => {
-            bar(
-                ui,
-                Colormap::Viridis,
-                "certainty",
-                "1".into(),
-                "probability",
-                "A cell above the threshold, 0.85 by default, counts as certain",
-            );
+            let hint = format!("A cell above the threshold {certain} counts as certain");
+            bar(ui, Colormap::Viridis, "certainty", "1".into(), "probability", &hint);
         }
         Shown::Map(MapKind::Entropy) => {
             let high = picture::entropy_range(grid)[1];

@@ -10,6 +10,7 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use nudge_core::plan::Action;
 use std::sync::Arc;
 
+mod form;
 mod look;
 
 type Show = fn(&mut egui::Ui, &mut Model, &mut Vec<Command>);

@@ -79,7 +79,7 @@ impl Split {
 }
 
 fn merged(surfaces: &[Component]) -> Component {
-    let mut all = Component { points: Vec::new(), triangles: Vec::new() };
+    let mut all = Component::default();
     for surface in surfaces {
         let first = all.points.len() as u32;
         all.points.extend(&surface.points);

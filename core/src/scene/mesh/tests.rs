@@ -45,7 +45,7 @@ impl Bench {
     }
 
     fn load(&self, name: &str, bytes: impl AsRef<[u8]>) -> Result<(MeshShape, MeshReport)> {
-        load_mesh(&self.file(name, bytes), name, None)
+        load_mesh(&self.file(name, bytes), name, None, None)
     }
 
     fn refusal(&self, name: &str, bytes: impl AsRef<[u8]>) -> String {
@@ -70,7 +70,7 @@ fn a_box_far_from_its_origin_stands_centred() {
     let class = Catalog::standard();
     let bench = Bench::new();
     let path = bench.file("b.obj", obj(&[box_mesh([0.0; 3], [0.1; 3])]));
-    let (_, of_class) = load_mesh(&path, "b.obj", class.by_name("meat_can")).expect("mesh");
+    let (_, of_class) = load_mesh(&path, "b.obj", class.by_name("meat_can"), None).expect("mesh");
     assert_eq!((of_class.mass_kg, of_class.mass_is_estimate), (0.370, false));
 }
 
@@ -213,10 +213,12 @@ fn units_that_are_not_metres_are_recognised() {
     }
     let catalog = Catalog::standard();
     let path = bench.file("inches.obj", cube(4.0));
-    let (_, report) = load_mesh(&path, "inches.obj", catalog.by_name("tomato_can")).expect("mesh");
+    let (_, report) = load_mesh(&path, "inches.obj", catalog.by_name("tomato_can"), None).expect("mesh");
     assert_eq!(report.metres_per_unit, 0.0254);
     assert!(bench.refusal("huge.obj", cube(1e8)).contains("no object in any of m, cm, mm, inches"));
-    assert_eq!(bench.load("large.obj", cube(2.5)).expect("mesh").1.warnings, Vec::<String>::new());
+    assert_eq!(bench.load("large.obj", cube(0.9)).expect("mesh").1.warnings, Vec::<String>::new());
+    let told = load_mesh(&bench.file("told.obj", cube(2.5)), "told.obj", None, Some(Unit::Metre)).expect("mesh");
+    assert_eq!((told.1.size_m, told.0.unit, told.1.warnings.len()), ([2.5; 3], Some(Unit::Metre), 0));
 }
 
 #[test]
@@ -245,7 +247,7 @@ fn bad_meshes_are_told_what_is_wrong() {
     assert!(bench.refusal("far.obj", far).contains("out of bounds"));
     let flat = "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\nf 3 2 1\n";
     assert!(bench.refusal("flat.obj", flat).contains("the mesh is flat"));
-    let missing = load_mesh(std::path::Path::new("no/such.obj"), "such.obj", None).expect_err("missing");
+    let missing = load_mesh(std::path::Path::new("no/such.obj"), "such.obj", None, None).expect_err("missing");
     assert!(matches!(missing, Error::Io { .. }));
 }
 
@@ -261,6 +263,57 @@ fn a_million_triangles_are_refused_at_once() {
     binary[80..84].copy_from_slice(&1_000_000_u32.to_le_bytes());
     binary.resize(84 + 50 * 1_000_000, 0);
     assert!(bench.refusal("huge.stl", binary).contains("1000000 triangles"));
+}
+
+#[test]
+fn faces_that_are_there_twice_count_once() {
+    let bench = Bench::new();
+    let (points, quads) = box_mesh([0.0; 3], [0.1; 3]);
+    let turned = |quads: &[[u32; 4]]| quads.iter().map(|[a, b, c, d]| [*a, *d, *c, *b]).collect::<Vec<_>>();
+    let twice = [quads.clone(), quads.clone()].concat();
+    let both_sides = [quads.clone(), turned(&quads)].concat();
+    let one_face = [quads.clone(), quads[..1].to_vec()].concat();
+    for (name, quads, repeated) in [("twice", twice, 12), ("sides", both_sides, 12), ("one", one_face, 2)] {
+        let (shape, report) = bench.load(&format!("{name}.obj"), obj(&[(points.clone(), quads)])).expect(name);
+        assert_eq!((shape.parts.len(), report.components), (1, 1), "{name}");
+        assert!((report.volume_m3 - 0.001).abs() < 1e-6, "{name} {}", report.volume_m3);
+        assert_eq!(report.warnings[0], format!("{repeated} triangles are there twice and count once"), "{name}");
+    }
+    // The whole object exported twice is a copy; boxes side by side are not, and keep the wall between them.
+    let copies = obj(&[(points.clone(), quads.clone()), (points.clone(), quads.clone())]);
+    let (_, report) = bench.load("copies.obj", copies).expect("mesh");
+    assert_eq!((report.components, report.warnings.len()), (1, 1), "{:?}", report.warnings);
+    let beside = obj(&[box_mesh([0.0; 3], [0.1; 3]), box_mesh([0.1, 0.0, 0.0], [0.2, 0.1, 0.1])]);
+    for (name, text) in [("apart", beside.clone()), ("together", beside.replace("o part1\n", ""))] {
+        let (_, report) = bench.load(&format!("{name}.obj"), text).expect(name);
+        assert!((report.volume_m3 - 0.002).abs() < 1e-6 && report.warnings.is_empty(), "{name} {report:?}");
+    }
+    // A hole stays one, however often the rest is there.
+    let open = [quads[1..].to_vec(), quads[1..].to_vec()].concat();
+    assert!(bench.refusal("open.obj", obj(&[(points, open)])).contains("the mesh is open: 4 edges"));
+}
+
+#[test]
+fn a_mesh_far_from_its_origin_is_measured_as_exactly_as_one_that_is_not() {
+    let bench = Bench::new();
+    for far in [0.0, 1e3, 5e5, 5e7] {
+        // Written with all digits, as a surveyor's tools do.
+        let (points, quads) = box_mesh([0.0; 3], [0.08, 0.06, 0.12]);
+        let mut text = String::new();
+        for [x, y, z] in points {
+            let _ = writeln!(text, "v {:.4} {:.4} {:.4}", far + f64::from(x), 2.0 * far + f64::from(y), f64::from(z));
+        }
+        for quad in quads {
+            let _ = writeln!(text, "f {}", quad.map(|i| (i + 1).to_string()).join(" "));
+        }
+        let (shape, report) = bench.load("far.obj", text).expect("mesh");
+        assert!((report.volume_m3 / 0.000_576 - 1.0).abs() < 1e-3, "{far}: {}", report.volume_m3);
+        assert!((report.size_m[0] - 0.08).abs() < 1e-5 && report.components == 1, "{far}: {:?}", report.size_m);
+        assert!(shape.solid().bounds().min.z.abs() < 1e-6);
+    }
+    let (points, quads) = box_mesh([3000.0, 0.0, 0.0], [3000.25, 0.125, 0.125]);
+    let message = bench.refusal("open.obj", obj(&[(points, quads[1..].to_vec())]));
+    assert!(message.contains("the first at (3000.0000, "), "where it is in the file: {message}");
 }
 
 #[test]
@@ -328,7 +381,7 @@ fn scanned_objects_have_the_sizes_of_their_files() {
     if !folder.exists() {
         return;
     }
-    let load = |name: &str| load_mesh(&folder.join(format!("{name}.obj")), name, None).expect(name).1;
+    let load = |name: &str| load_mesh(&folder.join(format!("{name}.obj")), name, None, None).expect(name).1;
     let gelatin = load("gelatin_box");
     assert!((gelatin.footprint.angle_deg - 42.0).abs() < 3.0 || (gelatin.footprint.angle_deg - 132.0).abs() < 3.0);
     assert!((gelatin.footprint.size_m[0] - 0.072).abs() < 0.003 && (gelatin.footprint.size_m[1] - 0.028).abs() < 0.003);

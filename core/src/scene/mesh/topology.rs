@@ -1,14 +1,17 @@
-//! From loose triangles to closed surfaces: corners joined, holes found, winding repaired, components told apart.
+//! From loose triangles to closed surfaces: corners joined, holes found, winding repaired, components separated.
 
 use super::bounds_of;
-use super::read::Group;
 use crate::Point;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Corners closer than these shares of the mesh's size are one; the first that closes the mesh is taken.
 const WELD: [f32; 3] = [1e-7, 1e-5, 1e-4];
 
-/// One closed surface, wound outwards.
+/// Corners closer than this share of the mesh's size make two surfaces the same one.
+const SAME: f32 = 1e-5;
+
+/// Triangles that belong together; once it is found, one closed surface, wound outwards.
+#[derive(Default)]
 pub struct Component {
     /// Corners, metres.
     pub points: Vec<Point>,
@@ -34,26 +37,39 @@ pub struct Topology {
     pub turned: usize,
     /// Surfaces wound inwards inside others, left out.
     pub cavities: usize,
+    /// Triangles that lie where others lie already, left out.
+    pub repeated: usize,
+}
+
+/// Why there is no closed surface.
+pub enum Fault {
+    /// Every triangle has shrunk to a line.
+    Flat,
+    /// There are holes.
+    Open {
+        /// Edges with a triangle on one side only.
+        edges: usize,
+        /// The middle of the first.
+        first: Point,
+    },
 }
 
 /// Finds the closed surfaces. Every group on its own when all are closed, so that parts that touch stay apart; all
 /// groups together otherwise (a surface may be split into groups by material).
-pub fn components(groups: &[Group]) -> Result<Topology, String> {
-    let extent = super::read::bounds(groups).map_or(0.0, |bounds| bounds.size().max());
-    let apart: Option<Vec<Vec<Component>>> =
-        groups.iter().map(|group| WELD.iter().find_map(|share| closed(&weld(group, share * extent)).ok())).collect();
-    let surfaces: Vec<Component> = match apart {
-        Some(surfaces) => surfaces.into_iter().flatten().collect(),
-        None => {
-            let all = merged(groups);
-            let tries: Vec<_> = WELD.iter().map(|share| closed(&weld(&all, share * extent))).collect();
-            let first_error = tries.iter().find_map(|result| result.as_ref().err().cloned());
-            let closed = tries.into_iter().find_map(Result::ok);
-            closed.ok_or_else(|| first_error.unwrap_or_default())?
-        }
+pub fn components(groups: &[Component]) -> Result<Topology, Fault> {
+    let all = bounds_of(
+        groups.iter().flat_map(|group| group.triangles.iter().flatten().map(move |i| group.points[*i as usize])),
+    );
+    let extent = all.map_or(0.0, |bounds| bounds.size().max());
+    let apart: Option<Vec<Closed>> = groups.iter().map(|group| closed_by_welding(group, extent).ok()).collect();
+    let found = match apart {
+        Some(found) => found,
+        None => vec![closed_by_welding(&merged(groups), extent)?],
     };
-    let mut topology = Topology { components: Vec::new(), turned: 0, cavities: 0 };
-    let mut surfaces: Vec<Component> = surfaces;
+    let mut repeated: usize = found.iter().map(|found| found.repeated).sum();
+    let mut surfaces: Vec<Component> = found.into_iter().flat_map(|found| found.surfaces).collect();
+    repeated += leave_out_copies(&mut surfaces, extent * SAME);
+    let mut topology = Topology { components: Vec::new(), turned: 0, cavities: 0, repeated };
     for surface in &mut surfaces {
         topology.turned += make_winding_consistent(surface);
     }
@@ -84,8 +100,68 @@ fn bounds(surface: &Component) -> crate::solid::Bounds {
         .unwrap_or(crate::solid::Bounds { min: Point::origin(), max: Point::origin() })
 }
 
-fn merged(groups: &[Group]) -> Group {
-    let mut all = Group::default();
+/// Closed surfaces, and how many triangles were there more than once.
+struct Closed {
+    surfaces: Vec<Component>,
+    repeated: usize,
+}
+
+/// Joins corners until the group is closed. A triangle that is there twice counts once, where what is left is closed
+/// (two boxes side by side share their wall, and need it twice) or where all are.
+fn closed_by_welding(group: &Component, extent: f32) -> Result<Closed, Fault> {
+    let mut first_fault = None;
+    for share in WELD {
+        let welded = weld(group, share * extent);
+        let once = once_each(&welded);
+        let repeated = welded.triangles.len() - once.triangles.len();
+        let found = match closed(&once) {
+            Ok(surfaces) => Ok(Closed { surfaces, repeated }),
+            Err(fault) if repeated == 0 || repeated >= once.triangles.len() => Err(fault),
+            Err(_) => closed(&welded).map(|surfaces| Closed { surfaces, repeated: 0 }),
+        };
+        match found {
+            Ok(found) => return Ok(found),
+            Err(fault) => first_fault = first_fault.or(Some(fault)),
+        }
+    }
+    Err(first_fault.unwrap_or(Fault::Flat))
+}
+
+/// The triangles without those that have the same three corners as an earlier one, whichever way they are wound.
+fn once_each(group: &Component) -> Component {
+    let mut known = HashSet::with_capacity(group.triangles.len());
+    let is_new = |triangle: &&[u32; 3]| {
+        let mut corners = **triangle;
+        corners.sort_unstable();
+        known.insert(corners)
+    };
+    Component { points: group.points.clone(), triangles: group.triangles.iter().filter(is_new).copied().collect() }
+}
+
+/// Leaves out surfaces that an earlier one is the same as; returns how many triangles went with them.
+fn leave_out_copies(surfaces: &mut Vec<Component>, tolerance: f32) -> usize {
+    let tolerance = tolerance.max(f32::MIN_POSITIVE);
+    let mut known: HashSet<Vec<[[i64; 3]; 3]>> = HashSet::new();
+    let before: usize = surfaces.iter().map(|surface| surface.triangles.len()).sum();
+    surfaces.retain(|surface| {
+        let place = |i: u32| {
+            let point = surface.points[i as usize];
+            [0, 1, 2].map(|axis| f64::from(point[axis] / tolerance).round() as i64)
+        };
+        let sorted = |triangle: &[u32; 3]| {
+            let mut corners = triangle.map(place);
+            corners.sort_unstable();
+            corners
+        };
+        let mut triangles: Vec<_> = surface.triangles.iter().map(sorted).collect();
+        triangles.sort_unstable();
+        known.insert(triangles)
+    });
+    before - surfaces.iter().map(|surface| surface.triangles.len()).sum::<usize>()
+}
+
+fn merged(groups: &[Component]) -> Component {
+    let mut all = Component::default();
     for group in groups {
         let first = all.points.len() as u32;
         all.points.extend(&group.points);
@@ -95,10 +171,10 @@ fn merged(groups: &[Group]) -> Group {
 }
 
 /// Joins corners that round to the same point; triangles that lose a corner are dropped.
-fn weld(group: &Group, tolerance: f32) -> Group {
+fn weld(group: &Component, tolerance: f32) -> Component {
     let tolerance = f64::from(tolerance.max(f32::MIN_POSITIVE));
     let origin = group.points.first().copied().unwrap_or_else(Point::origin);
-    let mut welded = Group::default();
+    let mut welded = Component::default();
     let mut known: HashMap<[i64; 3], u32> = HashMap::with_capacity(group.points.len());
     let index: Vec<u32> = group
         .points
@@ -128,20 +204,16 @@ fn edge_map(triangles: &[[u32; 3]]) -> BTreeMap<(u32, u32), Vec<(usize, bool)>> 
 }
 
 /// The connected components of a closed surface, or where it is open.
-fn closed(group: &Group) -> Result<Vec<Component>, String> {
+fn closed(group: &Component) -> Result<Vec<Component>, Fault> {
     if group.triangles.is_empty() {
-        return Err("the mesh is flat: every triangle has shrunk to a line".into());
+        return Err(Fault::Flat);
     }
     let edges = edge_map(&group.triangles);
     let mut open = edges.iter().filter(|(_, faces)| faces.len() % 2 == 1).map(|(edge, _)| edge);
     if let Some((a, b)) = open.next() {
-        let count = 1 + open.count();
-        let at = nalgebra::center(&group.points[*a as usize], &group.points[*b as usize]);
-        return Err(format!(
-            "the mesh is open: {count} edges have a triangle on one side only, the first at ({:.4}, {:.4}, {:.4}); close \
-             its holes",
-            at.x, at.y, at.z
-        ));
+        let edges = 1 + open.count();
+        let first = nalgebra::center(&group.points[*a as usize], &group.points[*b as usize]);
+        return Err(Fault::Open { edges, first });
     }
     let mut parent: Vec<u32> = (0..group.points.len() as u32).collect();
     fn root(parent: &mut [u32], mut i: u32) -> u32 {
@@ -162,7 +234,7 @@ fn closed(group: &Group) -> Result<Vec<Component>, String> {
     let mut index: Vec<Option<u32>> = vec![None; group.points.len()];
     for triangle in &group.triangles {
         let at = *order.entry(root(&mut parent, triangle[0])).or_insert_with(|| {
-            components.push(Component { points: Vec::new(), triangles: Vec::new() });
+            components.push(Component::default());
             components.len() - 1
         });
         let component = &mut components[at];

@@ -1,0 +1,171 @@
+//! Where results go: links, pipes, devices, and disks that are full.
+
+#![cfg(unix)]
+
+use super::{Folder, TIN, small_scene};
+use nudge_tests::{nudge_bin, nudge_fails, nudge_ok, root, text, venv_tool};
+use serde_json::Value;
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::fs::{FileTypeExt, symlink};
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+/// The arguments of a short run.
+fn run<'a>(scene: &'a str, out: &'a str) -> Vec<&'a str> {
+    vec!["run", scene, "--belief", "classical", "--policy", "random", "--budget", "3", "--out", out]
+}
+
+fn command(args: &[&str]) -> Command {
+    let mut command = Command::new(nudge_bin());
+    command.args(args).current_dir(root()).stderr(Stdio::piped());
+    command
+}
+
+/// How a program ends and what it said on standard error; it must end by itself.
+fn ends(mut child: Child) -> (ExitStatus, String) {
+    let started = Instant::now();
+    while child.try_wait().expect("waited").is_none() {
+        if started.elapsed() > Duration::from_secs(90) {
+            child.kill().expect("killed");
+            panic!("it hangs");
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let mut said = String::new();
+    child.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
+    (child.wait().expect("ended"), said)
+}
+
+/// The number of steps that the `episode.json` in a directory tells of.
+fn steps(directory: &Path) -> usize {
+    let text = fs::read(directory.join("episode.json")).expect("episode.json");
+    let record: Value = serde_json::from_slice(&text).expect("JSON");
+    record["steps"].as_array().expect("steps").len()
+}
+
+#[test]
+fn an_output_that_was_a_link_or_a_pipe_became_a_regular_file() {
+    let folder = Folder::new();
+    let scene = folder.write("s.toml", small_scene(TIN));
+    fs::create_dir(folder.path("elsewhere")).expect("created");
+    symlink("elsewhere/s.png", folder.path("link.png")).expect("linked");
+    for _ in 0..2 {
+        nudge_ok(&["scene", "thumbnail", &scene, "--out", &folder.name("link.png")]);
+        assert!(fs::symlink_metadata(folder.path("link.png")).expect("there").is_symlink());
+        assert!(fs::read(folder.path("elsewhere/s.png")).expect("a picture").starts_with(b"\x89PNG"));
+    }
+    let pipe = folder.path("pipe.png");
+    assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
+    let from = pipe.clone();
+    let reader = std::thread::spawn(move || fs::read(from).expect("read"));
+    nudge_ok(&["scene", "thumbnail", &scene, "--out", &folder.name("pipe.png")]);
+    // Before the reader is waited for: whoever replaces the pipe leaves it waiting.
+    assert!(fs::symlink_metadata(&pipe).expect("there").file_type().is_fifo());
+    assert!(reader.join().expect("no panic").starts_with(b"\x89PNG"));
+    if Path::new("/dev/full").exists() {
+        let line = nudge_fails(2, &["scene", "thumbnail", &scene, "--out", "/dev/full"]);
+        assert!(line.contains("/dev/full: No space left"), "{line}");
+        assert!(fs::symlink_metadata("/dev/full").expect("there").file_type().is_char_device());
+    }
+}
+
+#[test]
+fn a_reader_that_had_seen_enough_stopped_the_run_at_its_first_step() {
+    let folder = Folder::new();
+    let scene = folder.write("s.toml", small_scene(TIN));
+    let out = folder.name("e");
+    let cases = [run(&scene, &out), vec!["replay", &out]];
+    for args in cases {
+        let mut child = command(&args).stdout(Stdio::piped()).spawn().expect("starts");
+        if args[0] == "run" {
+            let mut first = String::new();
+            BufReader::new(child.stdout.take().expect("piped")).read_line(&mut first).expect("a line");
+            assert!(first.starts_with("small: "), "{first}");
+        }
+        drop(child.stdout.take());
+        let (status, said) = ends(child);
+        assert!(status.success() && said.is_empty(), "{args:?}: {status} {said}");
+        assert_eq!(steps(&folder.path("e")), 3, "the work is done all the same");
+    }
+    fs::create_dir(folder.path("set")).expect("created");
+    folder.write("set/a.toml", small_scene(TIN));
+    let (set, bench) = (folder.name("set"), folder.name("bench"));
+    let args = ["bench", &set, "--policies", "random", "--belief", "classical", "--seeds", "2", "--budget", "2"];
+    let mut child = command(&[&args[..], &["--jobs", "1", "--out", &bench]].concat())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    drop(child.stdout.take());
+    let (status, said) = ends(child);
+    assert!(status.success() && said.is_empty(), "{status} {said}");
+}
+
+#[test]
+fn a_full_standard_output_made_the_run_panic() {
+    let Ok(full) = File::options().write(true).open("/dev/full") else { return };
+    let folder = Folder::new();
+    let scene = folder.write("s.toml", small_scene(TIN));
+    let out = folder.name("e");
+    for args in [run(&scene, &out), vec!["replay", &out], vec!["views"]] {
+        let child = command(&args).stdout(full.try_clone().expect("cloned")).spawn().expect("starts");
+        let (status, said) = ends(child);
+        assert_eq!(status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.starts_with("nudge: standard output: No space left") && said.lines().count() == 1, "{said}");
+        assert_eq!(steps(&folder.path("e")), 3, "the work is done all the same");
+    }
+    // There is nowhere to say what is wrong with standard error.
+    let args = ["mesh", "/nowhere.obj"];
+    let status = Command::new(nudge_bin()).args(args).stderr(full).status().expect("starts");
+    assert_eq!(status.code(), Some(2));
+}
+
+#[test]
+fn a_disk_that_filled_up_during_a_run_made_it_hang_for_ever() {
+    let folder = Folder::new();
+    let scene = folder.write("s.toml", small_scene(TIN));
+    nudge_ok(&run(&scene, &folder.name("whole")));
+    let whole = fs::metadata(folder.path("whole/episode.rrd")).expect("a recording").len();
+    // No file may grow beyond some of that: the system then says no, as a full disk does. Units of 512 or 1024 bytes.
+    for share in [0.15, 0.5, 0.85, 0.97] {
+        let out = folder.name(&format!("e{share}"));
+        let limit = (share * whole as f64 / 1024.0) as u64;
+        let script = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$@\"");
+        let mut shell = Command::new("bash");
+        shell.args(["-c", &script, "bash"]).arg(nudge_bin()).args(run(&scene, &out));
+        let child = shell.current_dir(root()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("starts");
+        let (status, said) = ends(child);
+        assert_eq!(status.code(), Some(2), "{share}: {said}");
+        assert!(said.lines().count() == 1 && said.contains("episode.rrd: File too large"), "{share}: {said}");
+        let recording = fs::read(Path::new(&out).join("episode.rrd")).expect("a recording");
+        assert!(recording.len() as u64 <= limit * 1024, "{share}");
+        if !Path::new(&out).join("episode.json").exists() {
+            continue;
+        }
+        assert!(steps(Path::new(&out)) < 3 || share > 0.9, "{share}: it stopped before the end");
+        assert!(recording.starts_with(b"RRF2"));
+        nudge_ok(&["replay", &out]);
+        if let Some(rerun) = venv_tool("rerun") {
+            let file = Path::new(&out).join("episode.rrd");
+            let verified = Command::new(rerun).args(["rrd", "verify"]).arg(file).output().expect("rerun");
+            assert!(verified.status.success(), "{share}: {}", text(&verified.stderr));
+        }
+    }
+}
+
+#[test]
+fn the_printed_time_left_getting_ready_out() {
+    let folder = Folder::new();
+    let scene = folder.write("s.toml", small_scene(TIN));
+    let started = Instant::now();
+    let said = nudge_ok(&run(&scene, &folder.name("e")));
+    let whole_s = started.elapsed().as_secs_f64();
+    let line = said.lines().find(|line| line.trim_start().starts_with("time ")).expect("the time");
+    let numbers: Vec<f64> = line.split([' ', ',']).filter_map(|word| word.parse().ok()).collect();
+    let [total_s, parts_s @ ..] = &numbers[..] else { panic!("{line}") };
+    assert_eq!(parts_s.len(), 5, "{line}");
+    assert!((parts_s.iter().sum::<f64>() - total_s).abs() < 0.3, "{line}");
+    // The process starts and ends outside; a busy machine may take its time for that.
+    assert!(*total_s <= whole_s + 0.05 && *total_s > 0.6 * whole_s - 0.2, "{line}, {whole_s:.2} s");
+}

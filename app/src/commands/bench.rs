@@ -174,7 +174,7 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     // All policies of a bench share the networks, if they run on any.
     let update = policies.iter().find(|plan| plan.belief == belief);
     let networks = match update {
-        Some(PolicyPlan { policy, belief }) => belief_update(Some(belief), *policy)?.networks_used(),
+        Some(PolicyPlan { policy, belief, .. }) => belief_update(Some(belief), *policy)?.networks_used(),
         None => None,
     };
     Ok(Plan {

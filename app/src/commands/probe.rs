@@ -59,7 +59,8 @@ impl std::str::FromStr for Steps {
         if text == "all" {
             return Ok(Self::All);
         }
-        let steps = text.split(',').map(|step| step.trim().parse().ok().filter(|step| *step > 0)).collect();
+        let steps: Option<BTreeSet<usize>> =
+            text.split(',').map(|step| step.trim().parse().ok().filter(|step| *step > 0)).collect();
         steps
             .map(Self::These)
             .ok_or_else(|| "`all`, or numbers of steps with commas between them, is needed".to_owned())

@@ -252,3 +252,17 @@ pub fn default_out(scene: &Scene, policy: PolicyKind, seed: u64) -> PathBuf {
         scene.name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
     Path::new("out").join(format!("{name}-{policy}-{seed}"))
 }
+
+/// The belief update that a policy runs with unless another is asked for, as far as this program has it.
+#[cfg(feature = "workbench")]
+pub fn default_belief(policy: PolicyKind) -> &'static str {
+    let own = policy.default_belief();
+    let is_here = own != CNABU || (cnabu::AVAILABLE && cnabu::models_dir().is_some());
+    if is_here { own } else { CLASSICAL }
+}
+
+/// A belief update's name for people.
+#[cfg(feature = "workbench")]
+pub fn belief_title(name: &str) -> &str {
+    if name == CNABU { "networks (cnabu)" } else { name }
+}

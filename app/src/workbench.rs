@@ -21,6 +21,7 @@ pub mod latest;
 pub mod menu;
 pub mod model;
 pub mod panels;
+pub mod recording_file;
 pub mod session;
 pub mod shot;
 pub mod space;

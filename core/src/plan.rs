@@ -16,7 +16,7 @@ pub use look::{gain_field, gain_sources};
 pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
-pub use weigh::{COARSE_VIEWS, disturbance, draw_pushes};
+pub use weigh::{COARSE_VIEWS, disturbance, draw_pushes, push_sources};
 
 use crate::arm::{ArmTool, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, CNABU};

@@ -157,7 +157,7 @@ impl CellError {
     /// Its name in legends.
     pub fn title(self) -> &'static str {
         match self {
-            Self::Right => "right",
+            Self::Right => "correct",
             Self::Unknown => "unknown",
             Self::Missed => "missed",
             Self::Hallucinated => "hallucinated",

@@ -12,7 +12,7 @@ use super::command::{Command, Level};
 use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};
-use super::model::{GainSource, LayoutKind, Model, Preview, Remembered};
+use super::model::{GainSource, LayoutKind, Model, Picked, Preview, Remembered};
 use super::session::{Activity, SessionId};
 use super::space::{Drawn, Painter};
 use super::tasks::Tasks;
@@ -20,8 +20,9 @@ use super::threads::Threads;
 use super::viewer::Viewer;
 use super::worker::{Event, Worker};
 use crate::planner_args::PlannerArgs;
+use nudge_core::arm::Push;
 use nudge_core::camera::{NoiseModel, ViewId};
-use nudge_core::plan::PolicyKind;
+use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::Catalog;
 use re_viewer::external::{eframe, egui};
 use std::collections::{BTreeMap, BTreeSet};
@@ -193,6 +194,24 @@ pub struct Opening {
     pub title: String,
     /// How far it is.
     pub activity: Activity,
+    /// The path to be remembered once it is open.
+    remember: Option<PathBuf>,
+    /// What a branch keeps of the episode that it comes from.
+    kept: Option<Kept>,
+}
+
+impl Opening {
+    fn of(title: String) -> Self {
+        Self { title, activity: Activity::Opening { done: 0, of: 0 }, remember: None, kept: None }
+    }
+}
+
+/// What was decided and chosen in an episode where it was branched from.
+struct Kept {
+    decision: Option<Arc<Decision>>,
+    picked: Option<Picked>,
+    view: Option<ViewId>,
+    candidate: Option<usize>,
 }
 
 /// Both ends of a channel; the first is cloned for every thread that tells something.
@@ -221,6 +240,8 @@ pub struct App {
     begun: BTreeSet<PathBuf>,
     /// The gain that was asked for last: the state and the view.
     asked_gain: Option<((SessionId, usize), ViewId)>,
+    /// The prediction that was asked for last: the state and the push.
+    asked_preview: Option<((SessionId, usize), Push)>,
     /// Where the parts of the window were drawn last, points.
     parts: Vec<(Part, egui::Rect)>,
     viewer: Option<Viewer>,
@@ -306,6 +327,7 @@ impl App {
             pairs: Vec::new(),
             begun: BTreeSet::new(),
             asked_gain: None,
+            asked_preview: None,
             parts: Vec::new(),
             viewer: None,
             no_viewer: None,

@@ -187,13 +187,7 @@ fn explain(app: &mut App, layout: LayoutKind) {
                 app.ask(Command::GainOf(view));
             }
         }
-        LayoutKind::Push => {
-            let best = decision.and_then(|decision| Some((decision.best_push?, decision)));
-            if let Some((at, push)) = best.and_then(|(at, decision)| Some((at, decision.candidates.get(at)?.push))) {
-                app.model.candidate = Some(at);
-                app.ask(Command::Preview(push));
-            }
-        }
-        LayoutKind::Episode | LayoutKind::Compare | LayoutKind::Author => {}
+        // The layout of pushes chooses one by itself.
+        LayoutKind::Episode | LayoutKind::Push | LayoutKind::Compare | LayoutKind::Author => {}
     }
 }

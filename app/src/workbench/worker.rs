@@ -216,7 +216,7 @@ fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Pos
     post.send(Event::Activity(Activity::Idle));
     while let Ok(order) = inbox.recv() {
         let Track::Writing(driver) = &mut track else {
-            post.send(Event::Failed("this episode can only be looked at; branch from it to go on".to_owned()));
+            post.send(Event::Failed("this episode is read only; branch from it to continue".to_owned()));
             continue;
         };
         let done = match order {
@@ -316,7 +316,7 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
                 let (episode, difference) = review(&path, catalog.clone(), update.clone(), &mut watch)?;
                 drop(watch);
                 let reason = difference.map_or(why, |difference| {
-                    format!("its actions lead elsewhere when repeated here ({difference}); shown is what it holds")
+                    format!("repeating its actions gives another result here ({difference}); shown is what it holds")
                 });
                 Ok((Track::Reading, opened(&path, &episode, update, moments, Some(reason))?))
             };

@@ -79,16 +79,35 @@ impl Openings {
         predictions.par_iter().with_min_len(MIN_TOGETHER).map_init(scratch, of).collect()
     }
 
+    /// Where what a push opens comes from: voxel positions and their nats, in ascending order of position.
+    pub fn per_voxel(&self, prediction: &PushPrediction) -> Vec<(usize, f32)> {
+        let (mut field, mut opened) = (self.field.clone(), Opened::beyond(&self.open));
+        field.overwrite(prediction);
+        self.walk(&field, &mut opened);
+        let nats = |voxel: usize| {
+            let at = field.layout.padded(voxel);
+            let more = if opened.opened[at] > 0.0 { opened.opened[at] - self.open[at] } else { 0.0 };
+            more * LIKELIEST[usize::from(field.codes[at])].information
+        };
+        let voxels = (0..field.grid().voxel_count()).map(|voxel| (voxel, nats(voxel)));
+        voxels.filter(|(_, nats)| *nats > 0.0).collect()
+    }
+
     /// What a push opens; `field` is a copy of the own one, and is that again afterwards.
     fn under(&self, prediction: &PushPrediction, field: &mut GainField, opened: &mut Opened<'_>) -> f32 {
         field.overwrite(prediction);
+        self.walk(field, opened);
+        field.restore(&self.field, prediction.window);
+        opened.take()
+    }
+
+    /// Walks the rays that are no longer stopped where they were.
+    fn walk(&self, field: &GainField, opened: &mut Opened<'_>) {
         for (stop, ray) in self.stops.iter().zip(&self.rays) {
             if LIKELIEST[usize::from(field.codes[*stop])].pass > 0.0 {
                 ray.walk(field, opened);
             }
         }
-        field.restore(&self.field, prediction.window);
-        opened.take()
     }
 }
 
@@ -264,7 +283,10 @@ mod tests {
                 .zip(&after.codes)
                 .map(|((now, was), code)| f64::from((now - was).max(0.0) * MATTER[usize::from(*code)].information))
                 .sum();
-            let opened = Openings::new(&field, &array, &ids, density).under_each(&[prediction])[0];
+            let openings = Openings::new(&field, &array, &ids, density);
+            let sources: f64 = openings.per_voxel(&prediction).iter().map(|(_, nats)| f64::from(*nats)).sum();
+            assert!((sources - expected).abs() < 1e-3 * (1.0 + expected), "{sources} by voxel is not {expected}");
+            let opened = openings.under_each(&[prediction])[0];
             assert!((f64::from(opened) - expected).abs() < 1e-4 * (1.0 + expected), "{opened} is not {expected}");
             total += expected;
         }

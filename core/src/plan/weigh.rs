@@ -4,7 +4,7 @@ use super::{CandidateRecord, Counted, PlannerSettings, Situation, look};
 use crate::arm::{ArmTool, PushMotion};
 use crate::belief::{Belief, PushPrediction, SweptPush};
 use crate::camera::{ViewArray, ViewId};
-use crate::gain::{GainField, Openings, RayDensity, RayGains, gain_of_views};
+use crate::gain::{GainField, Openings, RayDensity, RayGains, gain_of_views, gain_per_voxel};
 use crate::grid::VoxelSet;
 use crate::push::{Candidate, PushSampler, PushTruth, sample};
 use crate::rng::{ChaCha8Rng, stream};
@@ -70,9 +70,7 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         .unzip();
 
     let offered = situation.offered();
-    let ids = |step: usize| offered.iter().copied().step_by(step).collect::<Vec<ViewId>>();
-    let coarse = ids((offered.len() / COARSE_VIEWS).max(1));
-    let worth = Worth::new(settings.counted, field, views, coarse);
+    let worth = Worth::new(settings.counted, field, views, coarse(&offered));
     let predictions = update.predict_pushes(belief, &pushes);
     let mut best: Option<(usize, &PushPrediction)> = None;
     for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(&feasible) {
@@ -87,8 +85,8 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         let after = field.with_prediction(prediction);
         match &worth {
             Worth::View(..) => {
-                let all = ids(1);
-                let (view, gain) = best_view(&all, &gain_of_views(&after, views, &all, RayDensity::FULL));
+                let gains = gain_of_views(&after, views, &offered, RayDensity::FULL);
+                let (view, gain) = best_view(&offered, &gains);
                 (candidates[at].view, candidates[at].gain) = (view, Some(gain));
             }
             Worth::Opened(_, coarse) => {
@@ -120,6 +118,31 @@ pub(super) fn weigh_clairvoyantly(
     }
     weighed.best = best.as_ref().map(|(at, _)| *at);
     (weighed, best.map(|(_, truth)| truth))
+}
+
+/// The views that rank the candidates, of those that are offered.
+fn coarse(offered: &[ViewId]) -> Vec<ViewId> {
+    offered.iter().copied().step_by((offered.len() / COARSE_VIEWS).max(1)).collect()
+}
+
+/// Where a push's worth comes from under its prediction: voxel positions and their nats, in ascending order of position.
+/// `field` is that of the belief before it, `offered` the views that count.
+///
+/// Where all voxels count it is the gain of `best`, the best view after the push, and nothing without one. Where only
+/// unseen voxels count it is what the push opens to all views together, as [`CandidateRecord::gain`] has it.
+pub fn push_sources(
+    counted: Counted,
+    field: &GainField,
+    array: &ViewArray,
+    offered: &[ViewId],
+    prediction: &PushPrediction,
+    best: Option<ViewId>,
+) -> Vec<(usize, f32)> {
+    match (counted, best) {
+        (Counted::All, None) => Vec::new(),
+        (Counted::All, Some(best)) => gain_per_voxel(&field.with_prediction(prediction), array, best, RayDensity::FULL),
+        (Counted::Unseen, _) => Openings::new(field, array, &coarse(offered), RayDensity::COARSE).per_voxel(prediction),
+    }
 }
 
 /// What makes a push worth it, and what is computed once for all candidates.

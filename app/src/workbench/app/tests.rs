@@ -3,11 +3,12 @@
 use super::{App, FormOptions, Options, Part};
 use crate::workbench::command::Command;
 use crate::workbench::dialog::Dialog;
-use crate::workbench::model::LayoutKind;
+use crate::workbench::model::{LayoutKind, StartForm};
 use crate::workbench::session::Activity;
 use crate::workbench::worker::Order;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use nudge_core::belief::CLASSICAL;
 use nudge_core::camera::NoiseModel;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -19,7 +20,8 @@ fn window(folder: &Path, budget: usize) -> Harness<'static, App> {
         .with_size([1440.0, 900.0])
         .build_eframe(move |cc| App::without_viewer(&cc.egui_ctx, options.clone()));
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/demo/first-look.toml");
-    harness.state_mut().model.kept.form.budget = budget;
+    let form = &mut harness.state_mut().model.kept.form;
+    *form = StartForm { budget, ..form.clone().with_belief(CLASSICAL) };
     harness.state_mut().ask(Command::Open(scene));
     wait(&mut harness);
     harness
@@ -137,7 +139,7 @@ fn an_episode_of_another_version_is_shown_as_it_is_filed() {
     // As if another version had written it.
     let path = reopened(&mut harness, |record| record["steps"][0]["scores"]["semantic_miou"] = 0.125.into());
     let session = harness.state().model.session().expect("shown all the same");
-    let reason = session.read_only.as_deref().expect("to look at only");
+    let reason = session.read_only.as_deref().expect("read only");
     assert!(reason.contains("step 1: scores.semantic_miou: 0.125 in the log"), "{reason}");
     assert_eq!((session.path.clone(), session.steps()), (path, 2));
     assert_eq!(session.moments[1].scores.semantic_miou, 0.125);
@@ -176,7 +178,7 @@ fn an_episode_of_the_networks_opens_in_a_build_without_them() {
         record.as_object_mut().expect("an object").remove("made_by");
     });
     let session = harness.state().model.session().expect("shown all the same");
-    let reason = session.read_only.as_deref().expect("to look at only");
+    let reason = session.read_only.as_deref().expect("read only");
     assert!(reason.contains("shown is what it holds"), "{reason}");
     assert_eq!((session.steps(), session.setup.update.is_some()), (1, nudge_core::cnabu::AVAILABLE));
 }

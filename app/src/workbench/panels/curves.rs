@@ -158,7 +158,7 @@ impl Curves<'_> {
                 let (rect, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
                 let ink = legend::line_ink(ui, series.rgb);
                 ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(2.0, ink));
-                ui.label(RichText::new(series.title).small());
+                ui.label(RichText::new(series.title).small()).on_hover_text(series.hint);
                 let value = match self.other {
                     None => at(self.session, series),
                     Some(other) => format!("A {} B {}", at(self.session, series), at(other, series)),

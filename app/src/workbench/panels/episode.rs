@@ -1,11 +1,11 @@
 //! The episode at the left: its scene, how it is run, what can be done next, and the other open episodes.
 
-use crate::driver::{BELIEFS, belief_update};
+use crate::driver::{BELIEFS, belief_title, belief_update};
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
-use crate::workbench::session::{Activity, Session};
+use crate::workbench::session::{Activity, Session, SessionId};
 use nudge_core::camera::{NoiseModel, ViewArray};
-use nudge_core::plan::{Counted, Place, PlannerSettings, PolicyKind, SETTINGS, Setting, Values};
+use nudge_core::plan::{Place, PlannerSettings, PolicyKind, SETTINGS, Setting, Values};
 use re_viewer::external::egui;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -17,8 +17,8 @@ static MISSING: LazyLock<BTreeMap<&str, String>> = LazyLock::new(|| {
 });
 
 /// Draws the episodes that are being opened, each with its progress.
-pub fn openings(ui: &mut egui::Ui, openings: &[(String, Activity)], ask: &mut Vec<Command>) {
-    for (title, activity) in openings {
+pub fn openings(ui: &mut egui::Ui, openings: &[(SessionId, String, Activity)], ask: &mut Vec<Command>) {
+    for (id, title, activity) in openings {
         ui.label(format!("Opening {title}"));
         match activity {
             Activity::Opening { done, of } if *of > 0 => {
@@ -28,8 +28,9 @@ pub fn openings(ui: &mut egui::Ui, openings: &[(String, Activity)], ask: &mut Ve
                 ui.add(egui::Spinner::new());
             }
         }
-        if ui.button("Cancel opening").on_hover_text("Stop repeating its log; its directory stays as it is").clicked() {
-            ask.push(Command::Cancel);
+        let hint = "Stop repeating its actions; its directory stays as it is";
+        if ui.button("Cancel opening").on_hover_text(hint).clicked() {
+            ask.push(Command::CancelOpening(*id));
         }
         ui.separator();
     }
@@ -57,11 +58,11 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
     ui.label(format!("{} objects, {hidden} hidden", scene.objects.len())).on_hover_text(if hidden == 0 {
         "Every object shows in at least one of the candidate views".to_owned()
     } else {
-        format!("No candidate view shows 25 pixels of: {}", session.setup.hidden.join(", "))
+        format!("No candidate view shows 25 pixels or more of: {}", session.setup.hidden.join(", "))
     });
     let mut facts = vec![
         ("policy", config.policy.to_string()),
-        ("belief", config.belief.clone()),
+        ("belief", belief_title(&config.belief).to_owned()),
         ("seed", config.seed.to_string()),
         ("budget", format!("{} actions", config.budget)),
     ];
@@ -97,7 +98,7 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
     let (steps, budget) = (session.steps(), session.record.config.budget);
     let doing = match session.activity {
         Activity::Idle if session.is_finished() => "the budget is used up",
-        Activity::Idle if session.read_only.is_some() => "to look at only",
+        Activity::Idle if session.read_only.is_some() => "read only",
         Activity::Idle if session.pending.is_some() => "decided",
         Activity::Idle => "ready",
         Activity::Opening { .. } => "opening",
@@ -166,15 +167,14 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
         ui.end_row();
         let label = ui.label("belief");
         egui::ComboBox::from_id_salt("belief")
-            .selected_text(&form.belief)
+            .selected_text(belief_title(&form.belief))
             .show_ui(ui, |ui| {
                 for belief in &BELIEFS {
                     let missing = MISSING.get(belief);
-                    let choice = egui::Button::selectable(form.belief == *belief, *belief);
+                    let choice = egui::Button::selectable(form.belief == *belief, belief_title(belief));
                     let choice = ui.add_enabled(missing.is_none(), choice);
                     if choice.on_disabled_hover_text(missing.map_or("", String::as_str)).clicked() {
-                        form.belief = (*belief).to_owned();
-                        form.planner = form.planner.counting(Counted::of_belief(belief));
+                        *form = form.clone().with_belief(belief);
                     }
                 }
             })
@@ -295,12 +295,17 @@ fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
     ui.separator();
     ui.weak("Open episodes");
     for session in &model.sessions {
-        // From the right, so that a long title gives way to the button beside it.
-        let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
-        ui.allocate_ui_with_layout(size, egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let is_shown = model.shown == Some(session.id);
-            if !is_shown {
-                let compare = ui.small_button("A|B");
+        let is_shown = model.shown == Some(session.id);
+        let busy = if session.activity == Activity::Idle { "" } else { " …" };
+        // In full: a branch is told from its origin by the end of its name.
+        let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
+        let row = ui.add(egui::Button::selectable(is_shown, title).wrap());
+        if row.on_hover_text(session.path.display().to_string()).clicked() {
+            ask.push(Command::Show(session.id));
+        }
+        if !is_shown {
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
+                let compare = ui.small_button("Compare");
                 compare.widget_info(|| {
                     let name = format!("Compare with {}", session.title());
                     egui::WidgetInfo::labeled(egui::WidgetType::Button, true, name)
@@ -308,15 +313,7 @@ fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
                 if compare.on_hover_text("Compare the shown episode with this one").clicked() {
                     ask.push(Command::CompareWith(Some(session.id)));
                 }
-            }
-            ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                let busy = if session.activity == Activity::Idle { "" } else { " …" };
-                let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
-                let row = ui.add(egui::Button::selectable(is_shown, title).truncate());
-                if row.on_hover_text(session.path.display().to_string()).clicked() {
-                    ask.push(Command::Show(session.id));
-                }
             });
-        });
+        }
     }
 }

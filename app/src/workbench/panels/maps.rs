@@ -196,15 +196,15 @@ fn map_legend(ui: &mut Ui, shown: Shown, grid: &Grid, certain: f32) {
     };
     match shown {
         Shown::Slice(_) => {
-            bar(ui, Colormap::Viridis, "occupancy", "1".into(), "probability", "p from free to occupied")
+            bar(ui, Colormap::Viridis, "occupancy", "1".into(), "probability", "Probability that the voxel is occupied")
         }
         Shown::Map(MapKind::Certainty) => {
-            let hint = format!("A cell above {certain} counts as known");
+            let hint = format!("A cell above the threshold {certain} counts as certain");
             bar(ui, Colormap::Viridis, "certainty", "1".into(), "probability", &hint);
         }
         Shown::Map(MapKind::Entropy) => {
             let high = picture::entropy_range(grid)[1];
-            let hint = "From nothing open to nothing known: ln 2 for every voxel below 0.27 m and ln 15 for the class";
+            let hint = "0 where everything is certain; the maximum, where nothing is known, is ln 2 for every voxel below 0.27 m and ln 15 for the class";
             bar(ui, Colormap::Magma, "entropy", words::significant(f64::from(high), 3), "nats", hint);
         }
         Shown::Map(MapKind::Error) => {

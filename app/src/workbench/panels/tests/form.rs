@@ -47,7 +47,9 @@ fn the_form_offers_view_arrays_a_file_and_noise() {
 #[test]
 fn a_way_to_count_brings_its_thresholds_and_the_button_puts_them_back() {
     let mut harness = form();
-    harness.state_mut().model.kept.form.planner.gamma = 0.5;
+    let chosen = &mut harness.state_mut().model.kept.form;
+    *chosen = chosen.clone().with_belief(nudge_core::belief::CLASSICAL);
+    chosen.planner.gamma = 0.5;
     choose(&mut harness, "gain of", "unseen voxels");
     let planner = harness.state().model.kept.form.planner;
     assert_eq!((planner.patience, planner.closing_steps, planner.gamma), (10.0, 4, 0.5));

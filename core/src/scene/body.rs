@@ -1,6 +1,6 @@
 //! The shelf and the rigid bodies in it.
 
-use super::ClassId;
+use super::{ClassId, outline};
 use crate::grid::Grid;
 use crate::solid::Solid;
 use crate::{Point, Pose};
@@ -70,4 +70,14 @@ pub struct Body {
     pub mass_kg: f32,
     /// Coulomb friction coefficient.
     pub friction: f32,
+}
+
+impl Body {
+    /// How thin it is as it stands: the smaller side of the smallest rectangle around its footprint, or its height where
+    /// that is less, metres.
+    pub fn thickness_m(&self) -> f32 {
+        let height = self.solid.bounds().size().z;
+        let rectangle = outline::smallest_rectangle(&self.solid.footprint());
+        rectangle.map_or(height, |rectangle| rectangle.size_m.iter().copied().fold(height, f32::min))
+    }
 }

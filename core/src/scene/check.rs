@@ -2,9 +2,8 @@
 
 use super::file::Places;
 use super::overlap::PlacedBody;
-use super::{Body, Catalog, Object, Scene, Shelf, Warning, outline};
+use super::{Body, Catalog, Object, Scene, Shelf, Warning};
 use crate::Result;
-use crate::solid::Solid;
 
 /// Most voxels a scene's grid may have.
 pub const MAX_VOXELS: usize = 10_000_000;
@@ -94,7 +93,7 @@ pub(super) fn check(scene: &Scene, catalog: &Catalog, places: &Places) -> Result
     }
     let voxel_m = scene.shelf.voxel_m;
     for (at, body) in bodies.iter().enumerate() {
-        let thickness = thickness_m(&body.solid);
+        let thickness = body.thickness_m();
         if thickness < voxel_m {
             warnings.push(format!(
                 "{} is {} thick, less than a voxel ({}): the map shows it one voxel thick",
@@ -105,13 +104,6 @@ pub(super) fn check(scene: &Scene, catalog: &Catalog, places: &Places) -> Result
         }
     }
     Ok(warnings)
-}
-
-/// The smaller side of the footprint's smallest rectangle, or the height where that is less, metres.
-fn thickness_m(solid: &Solid) -> f32 {
-    let height = solid.bounds().size().z;
-    let rectangle = outline::smallest_rectangle(&solid.footprint());
-    rectangle.map_or(height, |rectangle| rectangle.size_m.iter().copied().fold(height, f32::min))
 }
 
 fn check_name(scene: &Scene, places: &Places) -> Result<()> {

@@ -8,6 +8,9 @@ use crate::scene::{BACKGROUND, Body};
 use crate::solid::{HalfSpace, levels_inside};
 use rayon::prelude::*;
 
+/// A body of this thickness, in edges of a voxel, has a voxel's centre inside however it lies (the diagonal of a cube).
+const THIN_VOXELS: f32 = 1.75;
+
 /// The ground truth: the same shape as a belief's argmax (`ToMap(c)`).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TruthMap {
@@ -48,15 +51,16 @@ impl TruthMap {
         for object in truth.objects.iter().filter(|object| **object != u16::MAX) {
             is_there[usize::from(*object)] = true;
         }
-        for body in bodies.iter().filter(|body| !is_there[usize::from(body.id.0)]) {
-            truth.add_if_thin(grid, body);
+        let is_thin = |body: &Body| body.thickness_m() < THIN_VOXELS * grid.voxel_m;
+        for body in bodies.iter().filter(|body| !is_there[usize::from(body.id.0)] && is_thin(body)) {
+            truth.add_thin(grid, body);
         }
         truth
     }
 
-    /// Adds a body whose parts have no voxel's centre inside. Of the cells that it touches it names those where nothing
+    /// Adds a thin body if no voxel's centre is inside. Of the cells that it touches it names those where nothing
     /// is taller, or all where there is none of these.
-    fn add_if_thin(&mut self, grid: &Grid, body: &Body) {
+    fn add_thin(&mut self, grid: &Grid, body: &Body) {
         let mut parts = placed_parts(grid, std::slice::from_ref(body));
         let [_, depth, height] = self.dims;
         let columns = |parts: &[PlacedPart]| {

@@ -16,13 +16,17 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+/// How it is counted, at the end of the help.
+const HOW: &str = "Each episode is gone through again up to the step, and there every feasible push candidate is carried out \
+    in a copy of the world. Counted are objects of which any view of the array shows 25 pixels or more after a push and none \
+    did before (won), and the other way round (lost), and the space that a push opens: voxels that no look has seen, that no \
+    view reaches before and one reaches after, but for what was inside an object. All views count, at full resolution for \
+    objects, one ray in 8 x 8 pixels for space. rank is Spearman's correlation of promise and truth over the candidates, \
+    regret the best candidate's truth minus that of the one with the largest promise, random the mean over all.";
+
 /// What was typed.
-///
-/// Each episode is gone through again up to the step, and there every feasible push candidate is carried out in a copy of
-/// the world. Counted are objects of which any view of the array shows 25 pixels or more after a push and none did before
-/// (won), and the other way round (lost), and the space that a push opens: voxels that no look has seen, that no view reaches
-/// before and one reaches after. All views count, at full resolution for objects, one ray in 8 x 8 pixels for space.
 #[derive(clap::Args, Debug)]
+#[command(after_help = HOW)]
 pub struct Args {
     /// The episodes' directories
     #[arg(required = true, value_name = "EPISODE")]

@@ -85,7 +85,7 @@ fn row(mark: &str, probed: &ProbedPush) -> String {
 pub(super) fn headings() -> String {
     let [objects, volume] = ["objects won - lost", "space opened, litres"];
     format!(
-        "{:<NAME$} {:>14}  {objects:^39}  {volume:^39}  {:^19}\n{:<NAME$} {:>6} {:>7}  {}  {}  {:>5} {:>5} {:>7}\n",
+        "{:<NAME$} {:>14}  {objects:^39}  {volume:^39}  {}\n{:<NAME$} {:>6} {:>7}  {}  {}  {:>5} {:>5} {:>7}\n",
         "",
         "",
         "share of pushes",

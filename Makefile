@@ -1,31 +1,28 @@
-# make demo · make workbench · make workbench-cnabu · make cnabu · make test · make regress · make bench · make lint — each sets up what it needs, once.
-# Everything is built with one profile (release), in CARGO_TARGET_DIR if that is set, else in target/.
+# make demo · make workbench · make test · make bench · make install — each sets up what it needs, once. `make help` lists all.
+# Everything is built with one profile (release), in CARGO_TARGET_DIR if that is set, else in target/. Networks are a default
+# feature of every crate: libtorch is fetched once (scripts/libtorch.sh) unless LIBTORCH names one.
 export CARGO_TARGET_DIR ?= $(CURDIR)/target
 NUDGE := $(CARGO_TARGET_DIR)/release/nudge
 VENV  := $(CARGO_TARGET_DIR)/venv
-# The window with Rerun's viewer inside: about 1,000 crates. Without it the build is headless.
+CARGO := LIBTORCH="$$(scripts/libtorch.sh)" cargo
+# The window with Rerun's viewer inside adds about 350 crates to the headless build. Both share the rest (unify/README.md).
 WINDOW := --features nudge-tests/workbench
-
-# With neural belief updates: needs libtorch, which scripts/libtorch.sh fetches unless LIBTORCH names one. The tests' own
-# crate stays out: with it the window would come along.
-NETWORKS := -p nudge-core -p nudge --features nudge/cnabu
+CORE := -p nudge-core -p nudge-unify
 DATA := $(CURDIR)/out/data
+DEMO := scenes/high/can-phalanx.toml
 
-.PHONY: help setup graphics python demo workbench workbench-cnabu cnabu train train-push test test-cnabu test-headless regress bench bench-cnabu bench-window lint lint-cnabu
+.PHONY: help setup graphics python networks headless demo workbench workbench-build train train-push \
+	test test-core test-headless test-window regress bench bench-window lint lint-classical once install uninstall
 help:
-	@echo 'make demo        map a crowded shelf: prints the table, writes out/demo/'
-	@echo 'make workbench   build and open the window (the first build takes about 45 minutes on two cores)'
-	@echo 'make workbench-cnabu  the same with neural belief updates'
-	@echo 'make cnabu       build with neural belief updates (fetches libtorch, 540 MB, once)'
-	@echo 'make train       make data and train sigma_o; goes on where it was stopped (make train-push: sigma_m)'
-	@echo 'make test-cnabu  tests of the neural belief updates'
-	@echo 'make test        all tests, those of the window too (the first build takes about 45 minutes on two cores)'
-	@echo 'make test-headless  the tests that need no window'
-	@echo 'make regress     the scores of a small fixed bench against golden ones'
-	@echo 'make bench       the speed of the parts that matter, beside their targets'
-	@echo 'make bench-cnabu the speed of the neural belief updates, beside their targets'
-	@echo 'make bench-window what the window costs: frames, latency, memory'
-	@echo 'make lint        formatting, clippy and documentation without warnings'
+	@echo 'make demo             map a crowded shelf with and without pushes: prints the table, writes out/demo/'
+	@echo 'make workbench        build and open the window (make workbench-build: build only)'
+	@echo 'make test             all tests (make test-headless: those that need no window)'
+	@echo 'make regress          the scores of a small fixed bench against golden ones'
+	@echo 'make bench            the speed of the parts that matter, beside their targets'
+	@echo 'make bench-window     what the window costs: frames, latency, memory'
+	@echo 'make lint             formatting, clippy and documentation without warnings'
+	@echo 'make install          into PREFIX (~/.local unless told); make uninstall takes it away'
+	@echo 'make train            the data and the training of sigma_o, as its card tells (make train-push: sigma_m); hours'
 
 setup:
 	@scripts/setup.sh build
@@ -36,73 +33,82 @@ graphics: setup
 python: setup
 	@scripts/setup.sh python $(VENV)
 
-demo: setup
-	cargo build --release --locked --workspace
-	$(NUDGE) run scenes/high/key-blocker.toml --policy mem --budget 20 --seed 0 --out out/demo --force
+networks: setup
+	@scripts/libtorch.sh >/dev/null
 
-workbench: graphics
-	cargo build --release --locked --workspace $(WINDOW)
+headless: networks
+	$(CARGO) build --release --locked --workspace
+
+demo: headless
+	$(NUDGE) run $(DEMO) --policy mem --beside mem-no-push --budget 16 --seed 0 --out out/demo --force
+
+workbench-build: graphics networks
+	$(CARGO) build --release --locked --workspace $(WINDOW)
+
+workbench: workbench-build
 	$(NUDGE)
 
-workbench-cnabu: graphics
-	LIBTORCH="$$(scripts/libtorch.sh)" cargo build --release --locked --workspace $(WINDOW),nudge/cnabu
-	$(NUDGE)
+install: workbench-build
+	scripts/install.sh $(NUDGE) "$(or $(PREFIX),$(HOME)/.local)"
 
-cnabu: setup
-	LIBTORCH="$$(scripts/libtorch.sh)" cargo build --release --locked $(NETWORKS)
+uninstall:
+	scripts/install.sh --uninstall "$(or $(PREFIX),$(HOME)/.local)"
 
-train: cnabu
-	$(NUDGE) data maps --count 50 --seed 2 --noise 0 --out $(DATA)/maps/val
-	$(NUDGE) data maps --count 300 --seed 3 --noise 0 --out $(DATA)/maps/test
-	$(NUDGE) data maps --count 10000 --seed 1 --out $(DATA)/maps/train
+# The recipes of the shipped weights, as their cards tell them (a test compares). Each command goes on where it was stopped.
+# What comes out lies in out/models: NUDGE_MODELS=out/models runs on it.
+resume-or = $$([ -e $(1).safetensors ] && echo --resume || echo $(2))
+train: headless
+	$(NUDGE) data maps --seed 2 --count 50 --noise 0 --out $(DATA)/maps/val
+	$(NUDGE) data maps --seed 3 --count 300 --noise 0 --out $(DATA)/maps/test
+	$(NUDGE) data maps --seed 1 --count 3000 --noise 0.25 --out $(DATA)/maps/train_before
+	$(NUDGE) data maps --seed 5 --count 7000 --noise 0.25 --fill 0.3-0.5 --stretch 0.8-1.2 --stretch-share 0.3 --out $(DATA)/maps/train
+	$(NUDGE) train observe --data $(DATA)/maps/train_before --val $(DATA)/maps/val --out $(DATA)/sigma_o_before \
+		--width 32 --batch 4 --max-views 20 --move-share 0 --updates 13015 --seed 0 $(call resume-or,$(DATA)/sigma_o_before,)
+	$(NUDGE) train export observe $(DATA)/sigma_o_before --data $(DATA)/maps/train_before --test $(DATA)/maps/test --scenes 50 --out $(DATA)/before
 	$(NUDGE) train observe --data $(DATA)/maps/train --val $(DATA)/maps/val --out $(DATA)/sigma_o \
-		$$([ -e $(DATA)/sigma_o.safetensors ] && echo --resume) --patience 8
-	$(NUDGE) train export observe $(DATA)/sigma_o --data $(DATA)/maps/train --test $(DATA)/maps/test --out models
+		--width 32 --batch 4 --max-views 20 --move-share 0 --learning-rate 0.0007 --updates 33032 --seed 0 \
+		$(call resume-or,$(DATA)/sigma_o,--from $(DATA)/before/sigma_o.safetensors)
+	$(NUDGE) train export observe $(DATA)/sigma_o --data $(DATA)/maps/train --test $(DATA)/maps/test --out out/models
 
-train-push: cnabu
-	$(NUDGE) data pushes --count 50 --seed 2 --noise 0 --out $(DATA)/pushes/val
-	$(NUDGE) data pushes --count 300 --seed 3 --noise 0 --out $(DATA)/pushes/test
-	$(NUDGE) data pushes --count 6000 --seed 1 --out $(DATA)/pushes/train
+train-push: headless
+	$(NUDGE) data pushes --seed 2 --count 60 --noise 0 --out $(DATA)/pushes/val
+	$(NUDGE) data pushes --seed 3 --count 300 --noise 0 --out $(DATA)/pushes/test
+	$(NUDGE) data pushes --seed 1 --count 3300 --noise 0.25 --out $(DATA)/pushes/train
 	$(NUDGE) train push --data $(DATA)/pushes/train --val $(DATA)/pushes/val --out $(DATA)/sigma_m \
-		$$([ -e $(DATA)/sigma_m.safetensors ] && echo --resume) --patience 8
-	$(NUDGE) train export push $(DATA)/sigma_m --data $(DATA)/pushes/train --val $(DATA)/pushes/val --test $(DATA)/pushes/test --out models
+		--width 24 --batch 4 --learning-rate 0.001 --updates 8316 --seed 0 $(call resume-or,$(DATA)/sigma_m,)
+	$(NUDGE) train export push $(DATA)/sigma_m --data $(DATA)/pushes/train --val $(DATA)/pushes/val --test $(DATA)/pushes/test --out out/models
 
-test-cnabu: cnabu python
-	LIBTORCH="$$(scripts/libtorch.sh)" cargo test --release --locked $(NETWORKS) -- --include-ignored cnabu train
-	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked -p nudge-tests --features cnabu --test cnabu
+test: test-core test-window
 
-test: graphics python
-	cargo build --release --locked --workspace $(WINDOW)
-	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace --no-fail-fast $(WINDOW)
+test-core: networks
+	$(CARGO) test --release --locked --no-fail-fast $(CORE)
 
-test-headless: setup python
-	cargo build --release --locked --workspace
-	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) cargo test --release --locked --workspace
 
-regress: setup
-	cargo build --release --locked --workspace
+test-headless: headless python
+	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) $(CARGO) test --release --locked --no-fail-fast --workspace
+
+test-window: workbench-build python
+	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) $(CARGO) test --release --locked --no-fail-fast --workspace --exclude nudge-core $(WINDOW)
+
+regress: headless
 	$(NUDGE) regress
 
-bench: setup
-	cargo build --release --locked --workspace
-	cargo bench --locked --workspace --bench gain --bench arm --bench speed
+bench: headless
+	$(CARGO) bench --locked --workspace --bench gain --bench arm --bench networks --bench speed
 
-bench-cnabu: setup
-	LIBTORCH="$$(scripts/libtorch.sh)" cargo bench --locked $(NETWORKS) --bench networks
+bench-window: workbench-build
+	NUDGE_BIN=$(NUDGE) $(CARGO) bench --locked --workspace $(WINDOW) --bench window
 
-bench-window: graphics
-	cargo build --release --locked --workspace $(WINDOW)
-	NUDGE_BIN=$(NUDGE) cargo bench --locked --workspace $(WINDOW) --bench window
-
-# Clippy as a wrapper around the compiler lints the workspace against what the build has compiled anyway; `cargo clippy`
-# would check all of its 1,000 dependencies once more.
-lint: graphics
+# Clippy and rustdoc run as a wrapper around the compiler, on the workspace alone and against what the build has compiled:
+# `cargo clippy` and `cargo doc` would check all dependencies once more.
+LINT := RUSTC_WORKSPACE_WRAPPER=$(CURDIR)/scripts/lint-rustc.sh $(CARGO) build --release --locked --workspace
+lint: graphics networks
 	cargo fmt --all --check
-	CLIPPY_ARGS='-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__' RUSTC_WORKSPACE_WRAPPER=clippy-driver \
-		cargo build --release --locked --workspace --all-targets $(WINDOW)
-	RUSTDOCFLAGS='-D warnings' cargo doc --release --locked --workspace --no-deps
+	$(LINT) --all-targets $(WINDOW)
 
-lint-cnabu: setup
-	CLIPPY_ARGS='-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__' RUSTC_WORKSPACE_WRAPPER=clippy-driver \
-		LIBTORCH="$$(scripts/libtorch.sh)" cargo build --release --locked $(NETWORKS) --all-targets
-	LIBTORCH="$$(scripts/libtorch.sh)" RUSTDOCFLAGS='-D warnings' cargo doc --release --locked $(NETWORKS) --no-deps
+# The build without libtorch: it compiles, without warnings.
+lint-classical: setup
+	$(LINT) --no-default-features
+
+once: networks
+	scripts/compiled-once.sh

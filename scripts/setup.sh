@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs what a bare Debian lacks. `setup.sh build`: the C compiler that some crates need. `setup.sh graphics`: what
-# the window needs to build, and to draw without a display. `setup.sh python DIR`: a virtual environment with NumPy,
-# zstandard and the stock Rerun tools, which the tests use to read what Nudge writes.
+# Installs what a bare Debian lacks. `setup.sh build`: the compilers that some crates need, and pip, which fetches
+# libtorch. `setup.sh graphics`: what the window needs to build, and to draw without a display. `setup.sh python DIR`: a
+# virtual environment with NumPy, zstandard and the stock Rerun tools, which the tests use to read what Nudge writes.
 set -euo pipefail
 
 fail() { echo "setup: $*" >&2; exit 2; }
@@ -18,7 +18,12 @@ apt_install() {
 case "${1:-build}" in
 build)
     command -v cargo >/dev/null || fail "no cargo found; install Rust from https://rustup.rs"
-    command -v cc >/dev/null || apt_install build-essential
+    { command -v cc && command -v c++; } >/dev/null || apt_install build-essential
+    # Whoever names a libtorch needs no pip.
+    if [ -z "${LIBTORCH:-}" ]; then
+        command -v python3 >/dev/null || apt_install python3 python3-pip
+        python3 -m pip --version >/dev/null 2>&1 || apt_install python3-pip
+    fi
     ;;
 graphics)
     # The window: libudev for Rerun's viewer; Xvfb and Mesa's software Vulkan to draw without a display or a GPU.

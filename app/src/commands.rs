@@ -8,35 +8,47 @@ use std::process::ExitCode;
 mod bench;
 mod calibrate;
 mod data;
+mod doctor;
+mod manual;
 mod mesh;
-#[cfg(feature = "workbench")]
+#[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod open;
+mod probe;
+mod progress;
 mod regress;
 mod replay;
 mod report;
 mod robot;
 mod run;
 mod scene;
-#[cfg(feature = "workbench")]
+mod settings;
+#[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
 mod shot;
 mod train;
 mod views;
 
 /// Manipulation-enhanced mapping of cluttered shelves: look, push, and know how sure you are.
 #[derive(Parser)]
-#[command(name = "nudge", version, about, arg_required_else_help = !cfg!(feature = "workbench"))]
+#[command(name = "nudge", version, about, after_help = ENVIRONMENT, arg_required_else_help = !cfg!(feature = "workbench"))]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
 }
 
+/// What help and the man page say at their end.
+const ENVIRONMENT: &str = "\
+Environment:
+  NUDGE_MODELS  Folder of the networks' weights, in place of those that came with the program
+  NUDGE_SCENES  Folder of scenes, in place of those that came with the program
+  NUDGE_DEVICE  Device of the networks: auto, cpu or cuda
+
+Exit codes: 0 for success, 1 for a check that failed, 2 for wrong use or bad input";
+
 #[derive(Subcommand)]
 enum Command {
     /// Open the workbench, with a scene, an episode or a recording (the same as no command)
-    #[cfg(feature = "workbench")]
     Open(open::Args),
     /// Render the workbench's window to a picture, without a display
-    #[cfg(feature = "workbench")]
     Shot(shot::Args),
     /// Map a scene with a policy and write the episode
     Run(run::Args),
@@ -44,6 +56,8 @@ enum Command {
     Bench(bench::Args),
     /// Re-run an episode from its log and verify every step
     Replay(replay::Args),
+    /// Carry out every push candidate of a decision, and hold what was promised against what it really does
+    Probe(probe::Args),
     /// Hold the scores of a small fixed bench against golden ones
     Regress(regress::Args),
     /// Make a page of tables and charts of a bench
@@ -62,6 +76,13 @@ enum Command {
     Mesh(mesh::Args),
     /// Print the poses of a view array
     Views(views::Args),
+    /// Print the planner's settings: units, ranges, defaults and what they mean
+    Settings(settings::Args),
+    /// Tell what this installation is made of, and what is wrong with it
+    Doctor(doctor::Args),
+    /// Write man pages and shell completions
+    #[command(hide = true)]
+    Manual(manual::Args),
 }
 
 /// Parses the command line, runs the command and turns errors into one line and an exit code: 0 for success, 1 for a
@@ -77,9 +98,7 @@ pub fn main() -> ExitCode {
     let result = match Cli::parse().command {
         #[cfg(feature = "workbench")]
         None => open::run(&open::Args::default()),
-        #[cfg(feature = "workbench")]
         Some(Command::Open(args)) => open::run(&args),
-        #[cfg(feature = "workbench")]
         Some(Command::Shot(args)) => shot::run(&args),
         // Clap has shown the help already.
         #[cfg(not(feature = "workbench"))]
@@ -87,6 +106,7 @@ pub fn main() -> ExitCode {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Probe(args)) => probe::run(&args),
         Some(Command::Regress(args)) => regress::run(&args),
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Scene(args)) => scene::run(&args),
@@ -96,6 +116,9 @@ pub fn main() -> ExitCode {
         Some(Command::Calibrate(args)) => calibrate::run(&args),
         Some(Command::Mesh(args)) => mesh::run(&args),
         Some(Command::Views(args)) => views::run(&args),
+        Some(Command::Settings(args)) => settings::run(&args),
+        Some(Command::Doctor(args)) => doctor::run(&args),
+        Some(Command::Manual(args)) => manual::run(&args),
     };
     // An output that failed is told when the work is done.
     let result = result.and_then(|()| match crate::output::take_fault() {
@@ -137,17 +160,21 @@ impl DeviceArgs {
     }
 }
 
-/// What beliefs are updated by, and what is weighed how.
+/// What is seen, what beliefs are updated by, and what is weighed how.
 #[derive(clap::Args, Debug)]
 struct PlanningArgs {
-    /// How beliefs are updated: cnabu or classical (default: what a policy is published with)
-    #[arg(long)]
+    /// How beliefs are updated: cnabu (the networks) or classical (counting of rays) [default: cnabu; the policy random is
+    /// defined on the classical one]
+    #[arg(long, value_name = "cnabu|classical")]
     belief: Option<String>,
     #[command(flatten)]
     device: DeviceArgs,
     /// The view array: standard300, real75, or a file
     #[arg(long, default_value = "standard300")]
     views: String,
+    /// What the camera gets wrong: nothing, or as much as a consumer depth camera on an arm (depth, labels and poses)
+    #[arg(long, default_value = "none", value_name = "none|standard")]
+    noise: String,
     #[command(flatten)]
     planner: PlannerArgs,
 }
@@ -155,10 +182,33 @@ struct PlanningArgs {
 /// What to say when networks are asked for in a build without them.
 #[cfg(not(feature = "cnabu"))]
 fn no_networks() -> nudge_core::Error {
-    nudge_core::Error::Usage("this build has no networks; build it with --features cnabu (make cnabu)".to_owned())
+    nudge_core::Error::Usage(crate::driver::WITHOUT_NETWORKS.to_owned())
 }
 
 /// Tells of something on standard error that does not stop the work.
 fn warn(message: &str) {
     eprintln!("warning: {message}");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Cli;
+    use clap::{CommandFactory, Parser};
+
+    #[test]
+    fn help_lists_the_windows_commands_in_every_build() {
+        let help = Cli::command().render_help().to_string();
+        for command in ["open", "shot", "run"] {
+            assert!(help.lines().any(|line| line.trim_start().starts_with(&format!("{command} "))), "{help}");
+        }
+    }
+
+    #[test]
+    #[cfg(not(feature = "workbench"))]
+    fn without_the_window_its_commands_say_so_whatever_is_typed() {
+        let typed = ["nudge", "shot", "out/demo", "--layout", "why", "--out", "why.png"];
+        let Some(super::Command::Shot(args)) = Cli::try_parse_from(typed).expect("taken").command else { panic!() };
+        let said = super::shot::run(&args).expect_err("no window").to_string();
+        assert!(said.contains("make workbench"), "{said}");
+    }
 }

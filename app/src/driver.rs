@@ -5,14 +5,18 @@
 //! calls leaves a directory that [`Driver::resume`] goes on with.
 
 use crate::figure::{Moment, Summary, summary};
+use crate::made_by;
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical};
+use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::cnabu;
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, Observer, Overwrite, StepOutcome, resume};
+use nudge_core::episode::{
+    Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Observer, Overwrite, StepOutcome, resume,
+};
 use nudge_core::files::{remove_if_there, temporary_of};
 use nudge_core::plan::{Decision, PolicyKind};
-use nudge_core::scene::{Body, Catalog, Scene};
+use nudge_core::scene::{Body, Catalog, ObjectId, Scene};
 use nudge_core::world::TruthMap;
 use nudge_core::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -54,7 +58,7 @@ impl Story {
     }
 
     /// The figure of the episode as it stands.
-    fn figure(&self, episode: &Episode) -> Result<RgbImage> {
+    fn figure(&self, episode: &Episode, beside: Option<&EpisodeRecord>) -> Result<RgbImage> {
         let last = episode.record().steps.len();
         let mut moments: Vec<Moment<'_>> = self
             .moments
@@ -68,6 +72,7 @@ impl Story {
             catalog: episode.catalog(),
             start: &self.start,
             moments: &moments,
+            beside,
         })
     }
 }
@@ -86,6 +91,7 @@ impl Driver {
         overwrite: Overwrite,
     ) -> Result<Self> {
         let mut episode = Episode::new(scene, catalog, config, update)?;
+        episode.built_from(made_by::build());
         let mut directory = EpisodeDir::create(out, overwrite)?;
         let mut recorder = Recorder::create(&out.join(RECORDING), &episode)?;
         recorder.prior(&episode)?;
@@ -121,7 +127,8 @@ impl Driver {
         if resumed.is_err() && begun.is_some() {
             let _ = remove_if_there(&anew);
         }
-        let (directory, episode) = resumed?;
+        let (directory, mut episode) = resumed?;
+        episode.built_from(made_by::build());
         let (mut recorder, story) = begun.ok_or_else(|| Error::input(out, "", "holds no prior to go on from"))?;
         recorder.move_to(&out.join(RECORDING))?;
         Ok(Self { episode, directory, recorder, story })
@@ -156,11 +163,25 @@ impl Driver {
         Ok(outcome)
     }
 
+    /// The objects that no view of the array shows before the first action.
+    ///
+    /// # Errors
+    /// For a view array that cannot be read any more.
+    pub fn hidden(&self) -> Result<Vec<ObjectId>> {
+        let record = self.episode.record();
+        Ok(hidden_objects(&record.scene.shelf, &self.story.start, &ViewArray::named(&record.config.views)?))
+    }
+
     /// Ends the recording, draws the summary figure beside it, and gives the episode back.
     pub fn finish(self) -> Result<Episode> {
+        self.finish_beside(None)
+    }
+
+    /// The same with the scores of another episode of the same scene in the figure.
+    pub fn finish_beside(self, beside: Option<&EpisodeRecord>) -> Result<Episode> {
         let Self { episode, directory, recorder, story } = self;
         recorder.finish()?;
-        picture::save(&story.figure(&episode)?, &directory.path().join(SUMMARY))?;
+        picture::save(&story.figure(&episode, beside)?, &directory.path().join(SUMMARY))?;
         Ok(episode)
     }
 }
@@ -168,18 +189,14 @@ impl Driver {
 /// The names of the belief updates.
 pub const BELIEFS: [&str; 2] = [CLASSICAL, CNABU];
 
-/// The belief update that a policy runs with: the one named, or the policy's own. Says in the second value what a
-/// person should know about the choice.
+/// The belief update that a policy runs with: the one named, or the policy's own. No other one ever stands in for it.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that is unknown, or asked for but not there; what is wrong with the networks' weights.
-pub fn belief_update(named: Option<&str>, policy: PolicyKind) -> Result<(Arc<dyn BeliefUpdate>, Option<String>)> {
+/// [`Error::Usage`] for a name that is unknown, or whose networks are not there: it says what is missing and how to get
+/// it; what is wrong with the networks' weights.
+pub fn belief_update(named: Option<&str>, policy: PolicyKind) -> Result<Arc<dyn BeliefUpdate>> {
     let name = named.unwrap_or_else(|| policy.default_belief());
-    match (update_of(name)?, named) {
-        (Ok(update), _) => Ok((update, None)),
-        (Err(why), None) => Ok((Arc::new(Classical), Some(format!("{why}: {policy} runs on the classical belief")))),
-        (Err(why), Some(_)) => Err(Error::Usage(format!("--belief {name}: {why}; use classical"))),
-    }
+    update_of(name)?.map_err(|why| Error::Usage(format!("the belief {name} is not there: {why}")))
 }
 
 /// The belief update of a name, or why this program has none although it knows the name.
@@ -199,6 +216,13 @@ pub fn update_of(name: &str) -> Result<std::result::Result<Arc<dyn BeliefUpdate>
     }
 }
 
+/// Said where the program was built without networks.
+pub const WITHOUT_NETWORKS: &str =
+    "this program was built without networks; build it with them (`make demo`), or choose --belief classical";
+/// Said where no weights are found.
+const WITHOUT_WEIGHTS: &str = "no weights were found; name the folder that holds sigma_o.safetensors and \
+                               sigma_m.safetensors with NUDGE_MODELS, or choose --belief classical";
+
 /// Why there are no networks to run on.
 enum NoNetworks {
     /// This build has none, or no weights are there.
@@ -211,12 +235,13 @@ enum NoNetworks {
 fn networks() -> std::result::Result<Arc<dyn BeliefUpdate>, NoNetworks> {
     static LOADED: OnceLock<Arc<dyn BeliefUpdate>> = OnceLock::new();
     if !cnabu::AVAILABLE {
-        return Err(NoNetworks::Missing("this build has no networks"));
+        return Err(NoNetworks::Missing(WITHOUT_NETWORKS));
     }
     if let Some(loaded) = LOADED.get() {
         return Ok(loaded.clone());
     }
-    let directory = cnabu::models_dir().ok_or(NoNetworks::Missing("no network weights are there"))?;
+    let directory = cnabu::models_dir().ok_or(NoNetworks::Missing(WITHOUT_WEIGHTS))?;
+    cnabu::compute_beside_rayon();
     let update = cnabu::load(&directory).map_err(NoNetworks::Broken)?;
     Ok(LOADED.get_or_init(|| update).clone())
 }
@@ -226,4 +251,18 @@ pub fn default_out(scene: &Scene, policy: PolicyKind, seed: u64) -> PathBuf {
     let name: String =
         scene.name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '-' }).collect();
     Path::new("out").join(format!("{name}-{policy}-{seed}"))
+}
+
+/// The belief update that a policy runs with unless another is asked for, as far as this program has it.
+#[cfg(feature = "workbench")]
+pub fn default_belief(policy: PolicyKind) -> &'static str {
+    let own = policy.default_belief();
+    let is_here = own != CNABU || (cnabu::AVAILABLE && cnabu::models_dir().is_some());
+    if is_here { own } else { CLASSICAL }
+}
+
+/// A belief update's name for people.
+#[cfg(feature = "workbench")]
+pub fn belief_title(name: &str) -> &str {
+    if name == CNABU { "networks (cnabu)" } else { name }
 }

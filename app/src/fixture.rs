@@ -123,6 +123,8 @@ fn record(scene: Scene, prior: Scores, budget: usize) -> EpisodeRecord {
     EpisodeRecord {
         format: FORMAT,
         version: nudge_core::VERSION.to_owned(),
+        made_by: None,
+        also_made_by: Vec::new(),
         scene,
         config: EpisodeConfig {
             policy: PolicyKind::Mem,

@@ -1,82 +1,117 @@
-//! The planner's numbers on the command line, both ways: read from what was typed, and told as what to type.
+//! The planner's settings on the command line, both ways: read from what was typed, and told as what to type. Which options
+//! there are is [`SETTINGS`]' business.
 
-use nudge_core::plan::{Counted, PlannerSettings};
-use nudge_core::push::PushSampler;
+use clap::{Arg, ArgMatches, Command};
+use nudge_core::Result;
+use nudge_core::plan::{PlannerSettings, SETTINGS, Setting, Values};
+use std::collections::BTreeMap;
 
-/// What is weighed how.
-#[derive(clap::Args, Debug)]
+/// What was typed of the planner's settings, one option for each of [`SETTINGS`].
+///
+/// Values are read by [`PlannerArgs::settings`] and not by clap, so that a wrong one is told in one line as all other bad
+/// input is.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlannerArgs {
-    /// Which voxels a view's gain counts: all that it may see, with the paper's rule, or those that no look has seen yet
-    /// (default: unseen with the cnabu belief, else all)
-    #[arg(long, value_name = "all|unseen")]
-    gain: Option<Counted>,
-    /// Push candidates drawn per decision
-    #[arg(long, default_value_t = PlannerSettings::default().candidates)]
-    candidates: usize,
-    /// Where they are drawn: at the frontier, as in the paper, or at what stands before space that no look has seen
-    #[arg(long, value_name = "frontier|hidden", default_value_t)]
-    push_sampler: PushSampler,
-    /// How many times what looking promises a push has to promise, 0.1 to 100 (default: 10 where only unseen voxels count,
-    /// else 1)
-    #[arg(long, value_name = "X", value_parser = patience)]
-    patience: Option<f32>,
-    /// What a push has to promise at least, 0 to 100000 nats (default: 2000 where only unseen voxels count, else 0)
-    #[arg(long, value_name = "NATS", value_parser = push_floor)]
-    push_floor: Option<f32>,
-    /// Looks that follow a push before the next one, and at the end (default: 4 where only unseen voxels count, else 1)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
-    closing_steps: Option<u16>,
+    typed: BTreeMap<&'static str, String>,
 }
 
-fn patience(text: &str) -> Result<f32, String> {
-    let number = text.parse().ok().filter(|number| (0.1..=100.0).contains(number));
-    number.ok_or_else(|| "a number from 0.1 to 100 is needed".to_owned())
-}
-
-fn push_floor(text: &str) -> Result<f32, String> {
-    let nats = text.parse().ok().filter(|nats| (0.0..=1e5).contains(nats));
-    nats.ok_or_else(|| "a number of nats from 0 to 100000 is needed".to_owned())
-}
+/// The same where nothing typed means what was chosen last: in the window.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChosenLastArgs(pub PlannerArgs);
 
 impl PlannerArgs {
-    /// The planner's settings: the way to count that was asked for, or the one that serves the belief best, and what goes
-    /// with it where nothing else was asked for.
-    pub fn settings(&self, belief: &str) -> PlannerSettings {
-        let (candidates, push_sampler) = (self.candidates, self.push_sampler);
-        let counted = self.gain.unwrap_or_else(|| Counted::of_belief(belief));
-        let settings = PlannerSettings { candidates, push_sampler, ..PlannerSettings::default() }.counting(counted);
-        PlannerSettings {
-            patience: self.patience.unwrap_or(settings.patience),
-            closing_steps: self.closing_steps.map_or(settings.closing_steps, usize::from),
-            push_floor: self.push_floor.unwrap_or(settings.push_floor),
-            ..settings
-        }
+    /// The settings on a belief: what was typed, and the belief's defaults for the rest.
+    ///
+    /// # Errors
+    /// For a value that its option does not take: names the option and what it may be.
+    pub fn settings(&self, belief: &str) -> Result<PlannerSettings> {
+        PlannerSettings::of_belief(belief).with(&self.typed)
+    }
+
+    /// Other settings with what was typed.
+    ///
+    /// # Errors
+    /// As [`PlannerArgs::settings`].
+    pub fn onto(&self, settings: PlannerSettings) -> Result<PlannerSettings> {
+        settings.with(&self.typed)
     }
 }
 
-/// Every option with its value in some settings.
-pub fn options(planner: &PlannerSettings) -> [(&'static str, String); 6] {
-    [
-        ("--gain", planner.counted.to_string()),
-        ("--push-sampler", planner.push_sampler.to_string()),
-        ("--candidates", planner.candidates.to_string()),
-        ("--patience", planner.patience.to_string()),
-        ("--push-floor", planner.push_floor.to_string()),
-        ("--closing-steps", planner.closing_steps.to_string()),
-    ]
+/// The option of a setting; `default` is what its help says of that.
+fn option(setting: &'static Setting, default: &str) -> Arg {
+    let range = match &setting.values {
+        Values::Choice { .. } => String::new(),
+        _ => format!("{}; ", setting.limits()),
+    };
+    Arg::new(setting.name)
+        .long(setting.name)
+        .value_name(setting.placeholder)
+        .help(format!("{} [{range}default: {default}]", setting.help))
+        .help_heading("Planner settings")
+        .allow_negative_numbers(true)
+}
+
+impl clap::Args for PlannerArgs {
+    fn augment_args(command: Command) -> Command {
+        SETTINGS.iter().fold(command, |command, setting| command.arg(option(setting, &setting.default_words())))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl clap::FromArgMatches for PlannerArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        let typed = |setting: &Setting| Some((setting.name, matches.get_one::<String>(setting.name)?.clone()));
+        Ok(Self { typed: SETTINGS.iter().filter_map(typed).collect() })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        self.typed.extend(Self::from_arg_matches(matches)?.typed);
+        Ok(())
+    }
+}
+
+impl clap::Args for ChosenLastArgs {
+    fn augment_args(command: Command) -> Command {
+        SETTINGS.iter().fold(command, |command, setting| command.arg(option(setting, "the one chosen last")))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl clap::FromArgMatches for ChosenLastArgs {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<Self, clap::Error> {
+        PlannerArgs::from_arg_matches(matches).map(Self)
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        self.0.update_from_arg_matches(matches)
+    }
 }
 
 /// What to type for these settings with a belief update, beside its name: nothing where they are its own.
 pub fn to_type(planner: &PlannerSettings, belief: &str) -> String {
-    let own = options(&PlannerSettings::default().counting(Counted::of_belief(belief)));
-    let differing = options(planner).into_iter().zip(own).filter(|(asked, own)| asked != own);
-    differing.map(|((name, value), _)| format!(" {name} {value}")).collect()
+    let mut own = PlannerSettings::of_belief(belief);
+    let mut words = String::new();
+    // What goes with the way to count need not be typed once that is.
+    for setting in SETTINGS {
+        let value = setting.value(planner);
+        if setting.value(&own) != value {
+            words += &format!(" --{} {value}", setting.name);
+            let _ = setting.set(&mut own, &value);
+        }
+    }
+    words
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
+    use clap::{CommandFactory, Parser};
     use nudge_core::belief::{CLASSICAL, CNABU};
 
     #[derive(Parser)]
@@ -85,9 +120,9 @@ mod tests {
         planner: PlannerArgs,
     }
 
-    fn settings(typed: &str, belief: &str) -> PlannerSettings {
+    fn settings(typed: &str, belief: &str) -> Result<PlannerSettings> {
         let words = std::iter::once("nudge").chain(typed.split_whitespace());
-        Typed::try_parse_from(words).expect("well typed").planner.settings(belief)
+        Typed::try_parse_from(words).expect("options that there are").planner.settings(belief)
     }
 
     #[test]
@@ -97,22 +132,46 @@ mod tests {
             "--gain all",
             "--gain unseen --patience 3 --push-floor 500",
             "--push-sampler hidden --closing-steps 10 --candidates 7",
+            "--closing-steps 1 --gain unseen --gamma 0.35 --certain 0.9 --complete 1 --quiet-steps 0 --saturation 0.1",
         ];
         for (typed, belief) in cases.into_iter().flat_map(|typed| [(typed, CNABU), (typed, CLASSICAL)]) {
-            let meant = settings(typed, belief);
-            assert_eq!(settings(&to_type(&meant, belief), belief), meant, "{typed} with {belief}");
+            let meant = settings(typed, belief).expect("allowed");
+            assert_eq!(settings(&to_type(&meant, belief), belief).expect("allowed"), meant, "{typed} with {belief}");
         }
-        assert_eq!(to_type(&settings("", CNABU), CNABU), "");
-        assert_eq!(to_type(&settings("--patience 3", CNABU), CNABU), " --patience 3");
+        let told = |typed: &str| to_type(&settings(typed, CNABU).expect("allowed"), CNABU);
+        assert_eq!(told(""), "");
+        assert_eq!(told("--patience 3"), " --patience 3");
+        assert_eq!(told("--gain all"), " --gain all", "what goes with it is understood");
     }
 
     #[test]
-    fn numbers_out_of_range_are_refused() {
-        for wrong in ["--patience 0", "--patience nan", "--patience 101", "--closing-steps 0", "--push-floor -1"] {
-            assert!(
-                Typed::try_parse_from(std::iter::once("nudge").chain(wrong.split_whitespace())).is_err(),
-                "{wrong}"
-            );
+    fn numbers_out_of_range_are_refused_by_option_and_range() {
+        let cases = [
+            ("--patience 0", "--patience 0: must be a number from 0.1 to 100"),
+            ("--gamma nan", "--gamma nan: must be a number from 0 to 10"),
+            ("--gamma -0.5", "--gamma -0.5: must be a number from 0 to 10"),
+            ("--closing-steps 0", "--closing-steps 0: must be a whole number of looks from 1 to 1000"),
+            ("--push-floor -1", "--push-floor -1: must be a number of nats from 0 to 100000"),
+            ("--certain 1.5", "--certain 1.5: must be a probability from 0 to 1"),
+            ("--saturation inf", "--saturation inf: must be a share from 0 to 1"),
+            ("--candidates 1e3", "--candidates 1e3: must be a whole number from 0 to 1000"),
+            ("--gain some", "--gain some: must be all or unseen"),
+        ];
+        for (typed, said) in cases {
+            assert_eq!(settings(typed, CLASSICAL).expect_err(typed).to_string(), said);
         }
+    }
+
+    #[test]
+    fn help_tells_every_setting_with_its_range_and_default() {
+        let mut command = Typed::command();
+        let help = command.render_long_help().to_string();
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        for setting in SETTINGS {
+            assert!(help.contains(&format!("--{} <", setting.name)), "{} is not in {help}", setting.name);
+            let end = format!("default: {}]", setting.default_words());
+            assert!(help.contains(&end) && help.contains(setting.help), "{end} is not in {help}");
+        }
+        assert!(help.contains("[a number of nats from 0 to 100000; default: 0, or 2000 with --gain unseen]"), "{help}");
     }
 }

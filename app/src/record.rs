@@ -12,6 +12,7 @@ pub(crate) mod blueprint;
 pub(crate) mod decision;
 mod disk;
 mod floor;
+mod gain;
 pub(crate) mod layout;
 pub mod paths;
 mod remarks;
@@ -30,9 +31,9 @@ use nudge_core::arm::{ArmTool, Joints};
 use nudge_core::belief::{Belief, PushPrediction};
 use nudge_core::camera::{Image, View, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
-use nudge_core::gain::{GainField, RayDensity};
+use nudge_core::gain::GainField;
 use nudge_core::grid::{Grid, VoxelSet};
-use nudge_core::plan::{Action, PlannerSettings, gain_field, gain_sources};
+use nudge_core::plan::{Action, PlannerSettings, gain_field};
 use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
@@ -154,7 +155,7 @@ impl Recorder {
 
     /// Records a state with what led to it: without an outcome the prior. States come in the order of their steps.
     pub fn record(&mut self, setting: &Setting<'_>, state: &State<'_>, outcome: Option<&StepOutcome>) -> Result<()> {
-        let nats = outcome.map_or_else(Vec::new, |outcome| self.gain_of_voxels(setting, outcome));
+        let gain = outcome.zip(self.field.as_ref()).and_then(|(outcome, field)| gain::of(setting, field, outcome));
         let surprise = outcome.and_then(|outcome| outcome.prediction.as_ref()).zip(self.truth.as_ref());
         let surprise = surprise
             .map(|(predicted, before)| predicted.surprise(&state.belief.grid, &before.changed_cells(state.truth)));
@@ -163,7 +164,7 @@ impl Recorder {
         let surprise = surprise.map(|surprise| floor::picture(&picture::paint_surprise(&state.belief.grid, &surprise)));
         self.log_or_clear(paths::PREDICTED_SURPRISE, surprise)?;
         match outcome {
-            Some(outcome) => self.outcome(setting, state.belief, outcome, &nats)?,
+            Some(outcome) => self.outcome(setting, state.belief, outcome, gain.as_ref())?,
             None => {
                 let line = format!("prior: {}", decision::scores_line(state.scores));
                 self.note(line, rerun::TextLogLevel::INFO)?;
@@ -193,22 +194,6 @@ impl Recorder {
         std::fs::rename(&self.file, path).map_err(|error| Error::io(path, error))?;
         self.file = path.to_owned();
         Ok(())
-    }
-
-    /// Where the chosen action's gain comes from: the look's under the belief, the push's under its prediction.
-    fn gain_of_voxels(&self, setting: &Setting<'_>, outcome: &StepOutcome) -> Vec<(usize, f32)> {
-        let Some(field) = &self.field else { return Vec::new() };
-        let decision = &outcome.record.decision;
-        match (decision.action, &outcome.prediction) {
-            (Action::Look { view }, _) => gain_sources(field, setting.views, view, RayDensity::COARSE),
-            (Action::Push(_), Some(prediction)) => {
-                let best = decision.best_push.and_then(|at| decision.candidates.get(at)?.view);
-                best.map_or_else(Vec::new, |view| {
-                    gain_sources(&field.with_prediction(prediction), setting.views, view, RayDensity::COARSE)
-                })
-            }
-            (Action::Push(_), None) => Vec::new(),
-        }
     }
 
     fn set_up(&self, setting: &Setting<'_>) -> Result<()> {
@@ -334,7 +319,7 @@ impl Recorder {
         setting: &Setting<'_>,
         belief: &Belief,
         outcome: &StepOutcome,
-        nats: &[(usize, f32)],
+        gain: Option<&gain::Gain>,
     ) -> Result<()> {
         let (record, grid) = (&outcome.record, &belief.grid);
         let decision = &record.decision;
@@ -342,7 +327,8 @@ impl Recorder {
         self.log(paths::CAMERA_VIEWS, &shapes::frusta_colors(&decision.gains, range))?;
         self.log(paths::GAIN_VIEWS, &floor::gain_map(setting.views, &decision.gains, range))?;
         self.log(paths::GAIN_CHOSEN, &floor::chosen_views(setting.views, decision))?;
-        self.log_or_clear(paths::GAIN_VOXELS, (!nats.is_empty()).then(|| voxels::gains(grid, nats)))?;
+        self.log_or_clear(paths::GAIN_VOXELS, gain.map(|gain| voxels::gains(grid, &gain.nats)))?;
+        self.log_or_clear(paths::GAIN_LABEL, gain.map(|gain| gain.label(setting.shelf)))?;
         let any = !decision.candidates.is_empty();
         self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision, setting.planner.gamma)))?;
         match (record.action, &outcome.image) {

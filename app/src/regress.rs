@@ -1,28 +1,33 @@
 //! The regression gate: a small fixed bench whose scores must stay what they were.
 //!
-//! A golden file names scenes, policies and a budget, and holds for every policy what its episodes scored, with a tolerance
-//! for each score. A change that means to alter scores shows how, and [`Golden::bless`] takes the new ones over. Tolerances
-//! are measured, not chosen: [`SPREADS`] times the spread of the scores between seeds, which is how far they move when
-//! nothing but chance changes, and never below a floor for what another machine's rounding can do.
+//! A golden file names scenes, policies, a belief update and a budget, and holds for every policy what its episodes scored,
+//! with a tolerance for each score. A change that means to alter scores shows how, and [`Golden::bless`] takes the new ones
+//! over. Tolerances are measured, not chosen: episodes are the same bit for bit on one machine, and libtorch rounds
+//! differently where a processor has other instructions. So a blessing runs the networks with the instructions of older
+//! processors as well ([`OTHER_PROCESSORS`]); a tolerance is [`ROUNDINGS`] times the farthest that a score moves, and never
+//! below a floor.
 
 use crate::bench::{
     BenchDir, EpisodeResult, Event, FORMAT as BENCH_FORMAT, Plan, PolicyPlan, ScenePlan, SetPlan, Workers, run,
 };
 use crate::driver::belief_update;
 use nudge_core::files::write_atomically;
-use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
 use nudge_core::scene::{Catalog, Scene};
-use nudge_core::score::{deviation, mean};
+use nudge_core::score::mean;
 use nudge_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The format number of golden files.
 const FORMAT: u32 = 1;
-/// Standard deviations between seeds that a tolerance spans.
-pub const SPREADS: f64 = 3.0;
-/// Seeds that the spread is measured over.
-const SEEDS: u64 = 5;
+/// How many times what rounding moves a score a tolerance spans.
+pub const ROUNDINGS: f64 = 2.0;
+/// The environment in which libtorch computes as on a processor with AVX2 only, and on one without.
+pub const OTHER_PROCESSORS: [[(&str, &str); 2]; 2] = [
+    [("ATEN_CPU_CAPABILITY", "avx2"), ("ONEDNN_MAX_CPU_ISA", "AVX2")],
+    [("ATEN_CPU_CAPABILITY", "default"), ("ONEDNN_MAX_CPU_ISA", "SSE41")],
+];
 
 /// A golden file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -58,7 +63,7 @@ pub struct GoldenScore {
 }
 
 /// A score now, beside the golden one.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Compared {
     /// The policy.
     pub policy: PolicyKind,
@@ -87,7 +92,7 @@ enum Floor {
     Share(f64),
 }
 
-static WATCHED: [Watched; 7] = [
+static WATCHED: [Watched; 10] = [
     Watched { name: "occupancy_iou", of: |r| r.scores(r.steps.len()).occupancy_iou, floor: Floor::Number(0.004) },
     Watched { name: "occupied_iou", of: |r| r.scores(r.steps.len()).occupied_iou, floor: Floor::Number(0.004) },
     Watched { name: "semantic_miou", of: |r| r.scores(r.steps.len()).semantic_miou, floor: Floor::Number(0.004) },
@@ -95,7 +100,15 @@ static WATCHED: [Watched; 7] = [
     Watched { name: "mece_semantics", of: |r| r.scores(r.steps.len()).mece_semantics, floor: Floor::Number(0.004) },
     Watched { name: "entropy_nats", of: |r| r.scores(r.steps.len()).entropy_nats, floor: Floor::Share(0.005) },
     Watched { name: "gain_nats", of: mean_gain, floor: Floor::Share(0.005) },
+    Watched { name: "push_nats", of: mean_worth, floor: Floor::Share(0.01) },
+    Watched { name: "pushes", of: |r| r.pushes() as f64, floor: Floor::Number(0.0) },
+    Watched { name: "hidden_found", of: |r| r.revealed() as f64, floor: Floor::Number(0.0) },
 ];
+
+/// Worth of the best push, mean over the steps.
+fn mean_worth(result: &EpisodeResult) -> f64 {
+    mean(&result.steps.iter().map(|step| f64::from(step.igm)).collect::<Vec<_>>())
+}
 
 /// Gain of the best pair of views, mean over the steps.
 fn mean_gain(result: &EpisodeResult) -> f64 {
@@ -134,9 +147,9 @@ impl Golden {
     /// # Errors
     /// For scenes that cannot be read and episodes that cannot be run.
     pub fn compare(&self, path: &Path, workers: Workers, done: &mut dyn FnMut()) -> Result<Vec<Compared>> {
-        let results = self.run(path, 1, workers, done)?;
+        let results = self.run(path, workers, done)?;
         let compared = |policy: PolicyKind, watched: &Watched| {
-            let now = self.value(&results, policy, 0, watched);
+            let now = self.value(&results, policy, watched);
             let expected = self.scores.iter().find(|score| score.policy == policy && score.name == watched.name);
             Compared {
                 policy,
@@ -153,32 +166,26 @@ impl Golden {
         Ok(self.policies.iter().flat_map(of_policy).collect())
     }
 
-    /// Runs the episodes with several seeds and takes over what they score.
-    ///
-    /// # Errors
-    /// Those of [`Self::compare`].
-    pub fn bless(&self, path: &Path, workers: Workers, done: &mut dyn FnMut()) -> Result<Self> {
-        let results = self.run(path, SEEDS, workers, done)?;
-        let score = |policy: PolicyKind, watched: &Watched| {
-            let seeds = if policy.is_seeded() { SEEDS } else { 1 };
-            let values: Vec<f64> = (0..seeds).map(|seed| self.value(&results, policy, seed, watched)).collect();
-            let floor = match watched.floor {
-                Floor::Number(floor) => floor,
-                Floor::Share(share) => share * values[0].abs(),
+    /// Takes over what was scored now, with tolerances that follow from what was scored with other rounding.
+    pub fn bless(&self, now: &[Compared], rounded: &[Vec<Compared>]) -> Self {
+        let score = |scored: &Compared| {
+            let floor = match WATCHED.iter().find(|watched| watched.name == scored.name).map(|watched| &watched.floor) {
+                Some(Floor::Share(share)) => share * scored.now.abs(),
+                Some(Floor::Number(floor)) => *floor,
+                None => 0.0,
             };
-            // The golden value is that of seed 0, which may lie at one end of what the seeds bring.
-            let farthest = values.iter().map(|value| (value - values[0]).abs()).fold(0.0, f64::max);
-            let tolerance = floor.max(SPREADS * deviation(&values)).max(farthest);
-            GoldenScore { policy, name: watched.name.to_owned(), golden: values[0], tolerance }
+            let same = |other: &&Compared| (other.policy, &other.name) == (scored.policy, &scored.name);
+            let others = rounded.iter().filter_map(|run| run.iter().find(same));
+            let farthest = others.map(|other| (other.now - scored.now).abs()).fold(0.0, f64::max);
+            let tolerance = floor.max(ROUNDINGS * farthest);
+            GoldenScore { policy: scored.policy, name: scored.name.clone(), golden: scored.now, tolerance }
         };
-        let of_policy = |policy: &PolicyKind| WATCHED.iter().map(|watched| score(*policy, watched)).collect::<Vec<_>>();
-        Ok(Self { scores: self.policies.iter().flat_map(of_policy).collect(), ..self.clone() })
+        Self { scores: now.iter().map(score).collect(), ..self.clone() }
     }
 
-    /// Number of episodes of a blessing.
-    pub fn episodes_to_bless(&self) -> usize {
-        let seeds = |policy: &PolicyKind| if policy.is_seeded() { SEEDS as usize } else { 1 };
-        self.scenes.len() * self.policies.iter().map(seeds).sum::<usize>()
+    /// Whether the episodes run on networks, whose sums depend on the processor.
+    pub fn is_rounded(&self) -> bool {
+        self.belief == nudge_core::belief::CNABU
     }
 
     /// What is expected of a score.
@@ -198,13 +205,13 @@ impl Golden {
     }
 
     /// Mean of a score over the scenes.
-    fn value(&self, results: &[EpisodeResult], policy: PolicyKind, seed: u64, watched: &Watched) -> f64 {
-        let of_policy = results.iter().filter(|result| (result.policy, result.seed) == (policy, seed));
+    fn value(&self, results: &[EpisodeResult], policy: PolicyKind, watched: &Watched) -> f64 {
+        let of_policy = results.iter().filter(|result| result.policy == policy);
         mean(&of_policy.map(watched.of).collect::<Vec<_>>())
     }
 
-    fn run(&self, path: &Path, seeds: u64, workers: Workers, done: &mut dyn FnMut()) -> Result<Vec<EpisodeResult>> {
-        let plan = self.plan(path, seeds)?;
+    fn run(&self, path: &Path, workers: Workers, done: &mut dyn FnMut()) -> Result<Vec<EpisodeResult>> {
+        let plan = self.plan(path)?;
         let scratch = tempfile::tempdir().map_err(|error| Error::io(std::env::temp_dir(), error))?;
         let directory = BenchDir::prepare(scratch.path(), &plan)?;
         let (mut results, mut failed) = (Vec::new(), None);
@@ -216,11 +223,11 @@ impl Golden {
             done();
         })?;
         // In the order of the plan, whichever was ready first: sums do not depend on the number of workers.
-        results.sort_by(|a, b| (&a.scene, a.seed).cmp(&(&b.scene, b.seed)));
+        results.sort_by(|a, b| a.scene.cmp(&b.scene));
         failed.map_or(Ok(results), Err)
     }
 
-    fn plan(&self, path: &Path, seeds: u64) -> Result<Plan> {
+    fn plan(&self, path: &Path) -> Result<Plan> {
         let catalog = Catalog::standard();
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut scenes = Vec::new();
@@ -231,20 +238,23 @@ impl Golden {
         }
         let mut policies = Vec::new();
         for policy in &self.policies {
-            let (update, _) = belief_update(Some(&self.belief), *policy)?;
-            policies.push(PolicyPlan { policy: *policy, belief: update.name().to_owned() });
+            let update = belief_update(Some(&self.belief), *policy)?;
+            policies.push(PolicyPlan { policy: *policy, belief: update.name().to_owned(), planner: None });
         }
         Ok(Plan {
             format: BENCH_FORMAT,
             version: nudge_core::VERSION.to_owned(),
             budget: self.budget,
-            seeds,
+            seeds: 1,
             views: "standard300".to_owned(),
-            planner: PlannerSettings::default(),
+            planner: PlannerSettings::default().counting(Counted::of_belief(&self.belief)),
+            noise: None,
             policies,
             sets: vec![SetPlan { name: "regress".to_owned(), scenes }],
             broken: Vec::new(),
             shard: None,
+            made_by: None,
+            also_made_by: Vec::new(),
         })
     }
 }

@@ -14,11 +14,14 @@ pub mod derive;
 pub mod dialog;
 pub mod export;
 pub mod file_kind;
+pub mod graphics;
 pub mod half_belief;
+mod icon;
 pub mod latest;
 pub mod menu;
 pub mod model;
 pub mod panels;
+pub mod recording_file;
 pub mod session;
 pub mod shot;
 pub mod space;
@@ -35,6 +38,9 @@ mod fixture;
 use re_viewer::external::eframe;
 use re_viewer::external::egui;
 
+/// The name that desktops know the window by, and eframe the folder of what outlasts the program.
+pub const APP_ID: &str = "nudge";
+
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
@@ -42,7 +48,8 @@ use re_viewer::external::egui;
 pub fn run(options: app::Options) -> Result<(), String> {
     let mut native = re_viewer::native::eframe_options(None);
     native.viewport = egui::ViewportBuilder::default()
-        .with_app_id("nudge")
+        .with_app_id(APP_ID)
+        .with_icon(icon::icon())
         .with_title("Nudge")
         .with_inner_size([1440.0, 900.0])
         .with_min_inner_size([900.0, 560.0]);

@@ -22,6 +22,7 @@ fn main() {
     let (scene, _) = Scene::load(&file, &catalog).expect("scene");
     let bodies = scene.bodies(&catalog).expect("bodies");
     let views = ViewArray::named("standard300").expect("views");
+    cnabu::compute_beside_rayon();
     let update = cnabu::load(&cnabu::models_dir().expect("models/")).expect("weights");
 
     let observations: Vec<_> = (views.views.iter().step_by(37))

@@ -1,10 +1,10 @@
-//! The robot arm: its model, kinematics, collision checks, motion planning and the motions that come of it.
+//! The robot arm: its model, kinematics, collision checks, motion planning, and timed motions.
 //!
 //! An [`Arm`] is read from a URDF file and stands before the shelf. Everything here is a serial chain of up to
 //! [`MAX_JOINTS`] turning or sliding joints; arms built like the UR5 have a closed-form inverse, others a numeric one.
-//! A [`Space`] is what the arm may not touch (shelf, table, a map of believed voxels, itself); [`plan()`] finds ways
-//! through it (RRT-Connect, Kuffner and LaValle 2000) whose segments are checked by clearance and not by fixed steps
-//! (Schwarzer, Saha and Latombe 2005), so that nothing thin is jumped over.
+//! A [`Space`] is what the arm may not touch (shelf, table, a map of believed voxels, itself); [`plan()`] finds
+//! collision-free paths through it (RRT-Connect, Kuffner and LaValle 2000) whose segments are checked by clearance and
+//! not by fixed steps (Schwarzer, Saha and Latombe 2005), so that nothing thin is jumped over.
 //!
 //! Poses are in the shelf's frame. Kinematics is in `f64`, so that forward and inverse agree to a micrometre.
 

@@ -7,6 +7,7 @@
 mod carried;
 mod classical;
 mod floor;
+mod networks;
 mod sightings;
 
 #[cfg(feature = "cnabu")]
@@ -14,6 +15,7 @@ pub(crate) use carried::Carried;
 pub(crate) use carried::SOLID;
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
+pub use networks::{NetworksUsed, Weights, short};
 pub use sightings::{CHANGED, LOOKS_TAKEN, NEWS_REACH_M, Sightings, look};
 
 use crate::arm::{Arm, Push};
@@ -28,7 +30,8 @@ pub const CERTAIN: f32 = 0.85;
 /// The share of known floor cells at which a map is complete.
 pub const COMPLETE_SHARE: f32 = 0.95;
 
-/// How far a floor cell may be from the one where an object is met and still belong to it, metres: the longest object.
+/// Largest distance between a floor cell of an object and the cell where the object is touched, metres: the length of
+/// the longest object.
 pub const OBJECT_RADIUS_M: f32 = 0.20;
 
 /// What is believed about the shelf at one time step.
@@ -161,14 +164,14 @@ pub struct PushPrediction {
     pub change: Vec<f32>,
 }
 
-/// A prediction is taken to be no surer than this of a floor cell's changing or staying: 1 %.
+/// Smallest probability that a prediction is taken to give to what happens to a floor cell: 1 %.
 const SUREST: f32 = 0.01;
-/// The largest surprise of a floor cell, nats: what was as good as ruled out happened.
+/// The largest surprise of a floor cell, nats: the prediction gave at most 1 % to what happened.
 pub const MOST_SURPRISING: f32 = 4.605_17;
 
 impl PushPrediction {
-    /// Per floor cell, how surprising what happened is: `-ln` of the probability that was given to the cell's changing or
-    /// staying as it did, nats, at most [`MOST_SURPRISING`]. Cells outside the window were predicted to stay.
+    /// The surprise of every floor cell: `-ln` of the predicted probability of what happened to it (changed or
+    /// unchanged), nats, at most [`MOST_SURPRISING`]. Cells outside the window were predicted to stay.
     pub fn surprise(&self, grid: &Grid, changed: &[bool]) -> Vec<f32> {
         let mut chance = vec![0.0; grid.cell_count()];
         for (cell, change) in self.window.cells(grid).zip(&self.change) {
@@ -181,8 +184,8 @@ impl PushPrediction {
         chance.iter().zip(changed).map(surprise).collect()
     }
 
-    /// `H_s(belief) - H_s(predicted)`, nats: negative when the push blurs more labels than it settles. `belief` is the
-    /// one that the prediction was made from; cells outside the window cancel out.
+    /// `H_s(belief) - H_s(predicted)`, nats: negative when the push is predicted to make labels less certain. `belief`
+    /// is the one that the prediction was made from; cells outside the window cancel out.
     pub fn semantic_entropy_drop(&self, belief: &Belief) -> f64 {
         self.window
             .cells(&belief.grid)
@@ -232,9 +235,15 @@ pub trait BeliefUpdate: Send + Sync {
         Ok(())
     }
 
-    /// Whether beliefs wear when the same place is looked at again and again, so that [`look`] has to spare them.
+    /// Whether beliefs drift when the update is applied to the same place again and again, so that [`look`] limits
+    /// where a look changes them.
     fn wears(&self) -> bool {
         false
+    }
+
+    /// The networks that it runs on; `None` for an update without any.
+    fn networks_used(&self) -> Option<NetworksUsed> {
+        None
     }
 
     /// The belief after an observation: `lambda' = sigma_o(lambda, o)`. Episodes go through [`look`].

@@ -3,8 +3,8 @@
 //! Both are residual U-Nets over the floor plan whose channels are the heights; they give evidence, a Beta per voxel and a
 //! Dirichlet per floor cell, and are trained with evidential losses on our own simulated data ([`crate::learn`]).
 //!
-//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has this module's
-//! door only: [`AVAILABLE`] is false, and [`load`] says so.
+//! libtorch (by `tch`) does the arithmetic, behind the cargo feature `cnabu`. A build without the feature has only
+//! [`AVAILABLE`], which is false, and [`load`], which returns an error.
 
 #[cfg(feature = "cnabu")]
 mod layout;
@@ -50,36 +50,26 @@ pub(crate) use update::{belief_of, observation_planes};
 #[cfg(feature = "cnabu")]
 pub use weights::{Card, UPDATES, card_path, load_network, read_tensors, write_tensors};
 
-use crate::Result;
 use crate::belief::BeliefUpdate;
+use crate::{Result, places};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
-/// File name of sigma_m's weights; without it pushes are predicted classically.
+/// File name of sigma_m's weights; its card is beside it, with `.toml`.
 pub const PUSH_WEIGHTS: &str = "sigma_m.safetensors";
 /// Whether this build can run the networks.
 pub const AVAILABLE: bool = cfg!(feature = "cnabu");
 /// File name of sigma_o's weights in a models directory; its card is beside it, with `.toml`.
 pub const OBSERVE_WEIGHTS: &str = "sigma_o.safetensors";
-/// Names the directory of weights, before any other place.
-pub const MODELS_ENV: &str = "NUDGE_MODELS";
-
 /// The device that weights are loaded onto: `cpu`, `cuda`, or `auto`.
 pub const DEVICE_ENV: &str = "NUDGE_DEVICE";
 
-/// The directory of weights: [`MODELS_ENV`] if it is set, else the first `models` with weights in it beside or above the
-/// program, in the working directory, or in the source tree that it was built from.
+/// The directory of weights, where [`places`] finds it.
 pub fn models_dir() -> Option<PathBuf> {
-    if let Some(directory) = std::env::var_os(MODELS_ENV) {
-        return Some(directory.into());
-    }
-    let program = std::env::current_exe().ok();
-    let beside = program.iter().flat_map(|path| path.ancestors().skip(1)).map(|above| above.join("models"));
-    let rest = [PathBuf::from("models"), Path::new(env!("CARGO_MANIFEST_DIR")).join("../models")];
-    beside.chain(rest).find(|directory| directory.join(OBSERVE_WEIGHTS).is_file())
+    places::MODELS.find().map(|found| found.path)
 }
 
-/// What [`choose_device`] was told.
+/// The device that [`choose_device`] chose.
 static CHOSEN: OnceLock<String> = OnceLock::new();
 
 /// Chooses the device that weights are loaded onto, before [`DEVICE_ENV`]; the first choice holds.
@@ -110,10 +100,32 @@ fn chosen_device() -> Result<Device> {
     device(named.as_deref().unwrap_or("auto"))
 }
 
+/// The name of the device that weights are loaded onto: `cpu` or `cuda`.
+///
+/// # Errors
+/// As [`device`], for what [`choose_device`] or [`DEVICE_ENV`] named.
+#[cfg(feature = "cnabu")]
+pub fn device_name() -> Result<&'static str> {
+    Ok(if chosen_device()?.is_cuda() { "cuda" } else { "cpu" })
+}
+
 /// Number of threads that libtorch computes with.
+#[cfg(feature = "cnabu")]
+pub fn threads() -> usize {
+    tch::get_num_threads().try_into().unwrap_or(0)
+}
+
+/// Sets the number of threads that libtorch computes with.
 #[cfg(feature = "cnabu")]
 pub fn set_threads(threads: usize) {
     tch::set_num_threads(threads.clamp(1, 1024) as i32);
+}
+
+/// Has libtorch compute on the thread that asks, as rayon's threads share the work; once, before weights are loaded.
+/// (Training has libtorch's own threads: [`set_threads`].)
+pub fn compute_beside_rayon() {
+    #[cfg(feature = "cnabu")]
+    set_threads(1);
 }
 
 /// The device of a name: `cpu`, `cuda`, or `auto` for CUDA when libtorch has it.
@@ -146,11 +158,29 @@ pub fn load(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
     Ok(Arc::new(Cnabu::load(directory)?))
 }
 
+/// sigma_o alone with its weights in `directory`, to score observations.
+///
+/// # Errors
+/// As [`load`].
+#[cfg(feature = "cnabu")]
+pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    Ok(Arc::new(Cnabu::load_observation(directory)?))
+}
+
+/// sigma_o alone: not in this build.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "cnabu"))]
+pub fn load_observation(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
+    load(directory)
+}
+
 /// The networks with the weights in `directory`: not in this build.
 ///
 /// # Errors
 /// Always.
 #[cfg(not(feature = "cnabu"))]
 pub fn load(_directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
-    Err(crate::Error::Usage("this build has no networks; build it with --features cnabu (make cnabu)".to_owned()))
+    Err(crate::Error::Usage("this program was built without networks".to_owned()))
 }

@@ -3,8 +3,9 @@
 //! [`Episode`] is a state machine that the command line and the window drive one action at a time: [`Episode::decide`]
 //! says what the policy would do and changes nothing, [`Episode::act`] does it. A clone is a branch.
 //!
-//! The directory that an episode is written to, step by step, is [`EpisodeDir`]. [`resume`] goes on with a directory
-//! whose run was stopped; [`review`] looks at one without writing; [`replay`] runs one again from its log and verifies every step.
+//! The directory that an episode is written to, step by step, is [`EpisodeDir`]. [`resume`] continues a directory whose
+//! run was stopped; [`review`] opens one without writing; [`replay`] runs one again from its log and verifies every
+//! step.
 
 mod directory;
 mod document;
@@ -19,6 +20,9 @@ mod synthetic;
 pub use directory::{DirectoryState, EpisodeDir, Overwrite};
 pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
-pub use record::{EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds};
+pub use record::{
+    EpisodeConfig, EpisodeRecord, FORMAT, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
+};
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
+pub(crate) use resume::revisit;
 pub use resume::{Observer, resume, review};

@@ -1,9 +1,10 @@
-//! Files that are there whole or not at all.
+//! Atomic file writing: a file is there whole or not at all.
 //!
 //! A file is written beside its place under a name that starts with [`TEMPORARY`] and then renamed over it. A process
 //! that is killed leaves at most one such leftover, which the next writer removes.
 
 use crate::{Error, Result};
+use sha2::{Digest, Sha256};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -125,6 +126,19 @@ pub fn names_in(path: &Path) -> Result<Vec<String>> {
     }
 }
 
+/// SHA-256 of bytes, in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// SHA-256 of a file, in hexadecimal digits: what `sha256sum` prints.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn sha256_of_file(path: &Path) -> Result<String> {
+    Ok(sha256(&fs::read(path).map_err(|error| Error::io(path, error))?))
+}
+
 /// Stops writing at a chosen point, as a kill would, so that tests can look at what is left.
 #[cfg(test)]
 pub mod cut {
@@ -226,6 +240,18 @@ mod tests {
             assert!(write_atomically(Path::new("/dev/full"), b"something").is_err());
         }
         assert!(fs::symlink_metadata("/dev/null").expect("there").file_type().is_char_device());
+    }
+
+    #[test]
+    fn hashes_are_those_of_the_standard() {
+        // FIPS 180-4, the examples of one block and of none.
+        assert_eq!(sha256(b"abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+        assert_eq!(sha256(b""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let path = directory.path().join("file");
+        fs::write(&path, b"abc").expect("written");
+        assert_eq!(sha256_of_file(&path).expect("read"), sha256(b"abc"));
+        assert!(sha256_of_file(&directory.path().join("none")).is_err());
     }
 
     #[test]

@@ -36,6 +36,7 @@ mod field;
 mod open;
 mod pair;
 mod ray;
+mod reach;
 mod rescore;
 mod skip;
 #[cfg(test)]
@@ -45,6 +46,7 @@ pub use cover::{CELL_M, Coverage};
 pub use field::GainField;
 pub use open::{Openings, gain_together};
 pub use pair::{ViewPair, best_pair};
+pub use reach::TrueReach;
 pub use rescore::RayGains;
 
 use crate::camera::{ViewArray, ViewId};

@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_design_grid_has_its_published_size() {
+    fn the_grid_of_the_design_has_its_size() {
         let grid = Grid::for_shelf([0.80, 0.40, 0.40], 0.005);
         assert_eq!(grid.dims, [160, 80, 80]);
         assert_eq!((grid.voxel_count(), grid.cell_count()), (1_024_000, 12_800));

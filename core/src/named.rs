@@ -1,4 +1,4 @@
-//! Choices that have names: read back from what they display as.
+//! Choices that have names: parsed from what they display as.
 
 use std::fmt::Display;
 

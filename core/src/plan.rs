@@ -1,33 +1,30 @@
 //! The planner: look or push?
 //!
 //! Look (first view of IGV) if `IGV > IGM + gamma Reg`, else push; `Reg = min(0, H_s(belief) - H_s(predicted))` over the
-//! semantic map and `gamma = 1/5`. A [`Decision`] keeps everything that was weighed.
+//! semantic map and `gamma` is [`GAMMA`] unless a user says otherwise ([`SETTINGS`]). A [`Decision`] keeps everything that was
+//! weighed.
 
 mod decide;
 mod look;
 mod policy;
 mod rule;
+mod settings;
 mod weigh;
 
 pub use decide::decide;
 pub use look::{gain_field, gain_sources};
 pub use policy::PolicyKind;
-pub use rule::{
-    CLOSING_STEPS, PATIENCE, PUSH_EVERY, PUSH_FLOOR, QUIET_STEPS, RESTORING_STEPS, SATURATION, look_or_push,
-    push_guard, saturated, still_closing,
-};
-pub use weigh::{COARSE_VIEWS, disturbance};
+pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
+pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
+pub use weigh::{COARSE_VIEWS, disturbance, draw_pushes, push_sources};
 
 use crate::arm::{ArmTool, Push, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, CERTAIN, CNABU, COMPLETE_SHARE};
+use crate::belief::{Belief, BeliefUpdate, CNABU};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
 use crate::named;
-use crate::push::{PushSampler, Rejection};
+use crate::push::{PushTruth, Rejection};
 use serde::{Deserialize, Serialize};
-
-/// Weight of the disturbance term.
-pub const GAMMA: f32 = 0.2;
 
 /// What the robot does at one step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -48,17 +45,20 @@ pub enum Action {
 pub enum Reason {
     /// Looking tells more: `IGV > IGM + gamma Reg`.
     LookTellsMore,
-    /// Looking tells less than the best push, but that promises too little ([`PlannerSettings::push_floor`]).
+    /// The best push promises more than looking, but less than the floor ([`PlannerSettings::push_floor`]).
     PushTellsLittle,
     /// Pushing tells more: `IGV <= IGM + gamma Reg`.
     PushTellsMore,
-    /// The view that made the last push worth it.
+    /// The push really brings objects into sight: of the clairvoyant policy alone.
+    PushReveals,
+    /// Right after a push: the view for which the push was chosen.
     ViewOfPush,
     /// No push in the first steps.
     TooEarly,
     /// No push in the last step, or the last steps.
     LastStep,
-    /// No push right after a push, nor (policy `mem`) before it is closed by looks.
+    /// No push right after a push, nor (policy `mem`) before enough looks followed it
+    /// ([`PlannerSettings::closing_steps`]).
     JustPushed,
     /// The map is complete: only looks.
     MapComplete,
@@ -66,7 +66,7 @@ pub enum Reason {
     Dropped,
     /// No feasible push candidate.
     NoCandidate,
-    /// The policy's schedule or dice.
+    /// The policy's schedule or random choice.
     Schedule,
     /// Chosen by a person in the workbench, against the planner.
     Manual,
@@ -85,7 +85,7 @@ pub struct CandidateRecord {
     /// gain under the predicted belief: the best push's is exact, the others' come from fewer views and rays and are
     /// scaled to the same number of rays. Where only unseen voxels count it is what the push opens.
     pub gain: Option<f32>,
-    /// The best view after it, where it was looked for: of all candidates where it tells the gain, else of the best.
+    /// The best view after it. Where all voxels count every candidate has one, else only the best candidate.
     pub view: Option<ViewId>,
     /// `min(0, H_s(belief) - H_s(predicted))`, nats.
     pub reg: Option<f32>,
@@ -110,9 +110,10 @@ pub struct Decision {
     pub reason: Reason,
     /// Gain of the best pair of views, nats ([`Counted`] says of what).
     pub igv: f32,
-    /// Worth of the best push, nats; 0 when none was weighed.
+    /// Worth of the best push, nats; 0 when none was weighed. Of a clairvoyant policy what is unknown of the space that it
+    /// really opens, not what it promises.
     pub igm: f32,
-    /// Disturbance of the best push, nats, at most 0.
+    /// Disturbance of the best push, nats, at most 0; 0 of a clairvoyant policy.
     pub reg: f32,
     /// First and second view of the best pair.
     pub pair: Vec<ViewId>,
@@ -121,7 +122,7 @@ pub struct Decision {
     /// The push candidates, in the order drawn.
     #[serde(default)]
     pub candidates: Vec<CandidateRecord>,
-    /// Position of the best push in `candidates`.
+    /// Position of the best push in `candidates`: best by what it promises, of a clairvoyant policy by what it really does.
     #[serde(default)]
     pub best_push: Option<usize>,
     /// The arm's motion for the push that is the action, else for the best one; `None` where none was weighed.
@@ -136,7 +137,7 @@ pub struct History {
     pub actions: Vec<Action>,
     /// Views used since the last push.
     pub used_views: Vec<ViewId>,
-    /// The view that made the last push worth it, right after that push.
+    /// Right after a push: the view for which the push was chosen.
     pub view_of_push: Option<ViewId>,
     /// Best single-view gains of the look steps so far, for saturation.
     pub best_gains: Vec<f32>,
@@ -152,10 +153,10 @@ impl Decision {
 }
 
 impl History {
-    /// Takes down that `decision.action` was done, and whether it dropped an object.
+    /// Records that `decision.action` was done, and whether it dropped an object.
     ///
-    /// A look uses its view up; a push clears the used views and, unless it dropped something, leaves the view that made
-    /// it worth it for the next step.
+    /// A look uses its view up; a push clears the used views and, unless it dropped something, keeps the view for which
+    /// it was chosen for the next step.
     pub fn record(&mut self, decision: &Decision, dropped: bool) {
         self.actions.push(decision.action);
         self.dropped |= dropped;
@@ -208,6 +209,8 @@ pub struct Situation<'a> {
     pub seed: u64,
     /// The belief after really looking from a view: for the clairvoyant oracle only.
     pub really_look: &'a (dyn Fn(ViewId) -> Belief + Sync),
+    /// What pushes would really do, one answer per motion: for clairvoyant policies only.
+    pub really_push: &'a (dyn Fn(&[PushMotion]) -> Vec<PushTruth> + Sync),
 }
 
 impl Situation<'_> {
@@ -217,16 +220,17 @@ impl Situation<'_> {
     }
 }
 
-/// Which voxels a view's gain counts, and by what a push is worth it.
+/// Which voxels count as a gain, and what a push is worth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Counted {
-    /// All that the view may see; a push is worth the best single view after it. As in the paper.
+    /// All voxels that the view may see, summed over its rays; a push is worth the best single view after it. As in the
+    /// paper.
     #[default]
     All,
-    /// Those that no look has seen yet, or not since a push may have changed them. What a push would make uncertain of
-    /// what was seen is no gain; it is worth what it opens to all views together ([`crate::gain::Openings`]). Each voxel
-    /// counts once: in the gain of a view ([`crate::gain::Coverage`]), in IGV and in IGM.
+    /// Only voxels that no look has seen yet, or not since a push has probably changed them. Each voxel counts once: in
+    /// the gain of a view ([`crate::gain::Coverage`]), in IGV and in IGM. A push is worth the unseen space that it
+    /// opens to all views together ([`crate::gain::Openings`]); making seen voxels uncertain is no gain.
     Unseen,
 }
 
@@ -234,8 +238,8 @@ impl Counted {
     /// Both.
     pub const ALL: [Self; 2] = [Self::All, Self::Unseen];
 
-    /// What serves a belief best, by the belief update's name: the networks stay unsure of edges however often they are
-    /// looked at, so there only unseen voxels count.
+    /// The default for a belief update, by its name: the networks stay uncertain of edges however often they are looked
+    /// at, so with them only unseen voxels count.
     pub fn of_belief(name: &str) -> Self {
         if name == CNABU { Self::Unseen } else { Self::All }
     }
@@ -271,72 +275,6 @@ impl std::str::FromStr for Counted {
 
     fn from_str(text: &str) -> Result<Self, String> {
         named::parse(&Self::ALL, text)
-    }
-}
-
-/// Numbers of the planner that a user may change.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct PlannerSettings {
-    /// Which voxels count as a gain.
-    pub counted: Counted,
-    /// Push candidates drawn per decision.
-    pub candidates: usize,
-    /// Where they are drawn. Pushes of policies that push at random come from the frontier all the same.
-    pub push_sampler: PushSampler,
-    /// Weight of the disturbance term.
-    pub gamma: f32,
-    /// A push has to promise this many times what looking does: look if `patience IGV > IGM + gamma Reg`.
-    pub patience: f32,
-    /// A push has to promise at least this, nats: it also costs, in things that were found and are lost again and in looks
-    /// that make good what it disturbs. Look if `max(patience IGV, push_floor) > IGM + gamma Reg`.
-    pub push_floor: f32,
-    /// A floor cell whose likeliest class is more probable than this is certain.
-    pub certain: f32,
-    /// The map is complete, and nothing is pushed any more, once this share of the floor cells is certain.
-    pub complete: f32,
-    /// The first steps, in which nothing is pushed.
-    pub quiet_steps: usize,
-    /// Looks that close a push, making good what it disturbs and seeing what it opens: none is made in the last so many
-    /// steps, and `mem` makes none before so many looks followed the one before.
-    pub closing_steps: usize,
-    /// The policy `saturation` pushes once two consecutive best gains differ by less than this share.
-    pub saturation: f32,
-}
-
-impl Default for PlannerSettings {
-    fn default() -> Self {
-        Self {
-            counted: Counted::default(),
-            candidates: 80,
-            push_sampler: PushSampler::default(),
-            gamma: GAMMA,
-            patience: 1.0,
-            push_floor: 0.0,
-            certain: CERTAIN,
-            complete: COMPLETE_SHARE,
-            quiet_steps: QUIET_STEPS,
-            closing_steps: CLOSING_STEPS,
-            saturation: SATURATION,
-        }
-    }
-}
-
-impl PlannerSettings {
-    /// These settings with what goes with a way to count: the paper's rule where all voxels count. Where only unseen ones
-    /// do, a push has to promise [`PATIENCE`] times what looking does, and at least [`PUSH_FLOOR`]; and
-    /// [`RESTORING_STEPS`] looks close it: a push takes about that many to pay off.
-    pub fn counting(self, counted: Counted) -> Self {
-        let (patience, push_floor, closing_steps) = match counted {
-            Counted::All => (1.0, 0.0, CLOSING_STEPS),
-            Counted::Unseen => (PATIENCE, PUSH_FLOOR, RESTORING_STEPS),
-        };
-        Self { counted, patience, push_floor, closing_steps, ..self }
-    }
-
-    /// What `IGM + gamma Reg` of a push has to reach where looking promises `igv`, nats.
-    pub fn asked_of_pushes(&self, igv: f32) -> f32 {
-        (self.patience * igv).max(self.push_floor)
     }
 }
 

@@ -4,18 +4,20 @@
 //! tool's height [`TOOL_HEIGHT_M`] above the board, and are 50 to 150 mm long. A candidate is feasible if the arm has a motion
 //! for it that touches neither the shelf nor what is believed to stand there, the target apart; see [`ArmClearance`].
 //!
-//! * From the frontier, as in the paper: the frontier is the first surely occupied voxel ([`CONFIDENT`]) seen from the shelf's
-//!   entrance in each (x, z) column. A push starts before a random point of it and goes towards a random likely occupied voxel
+//! * From the frontier, as in the paper (which leaves distances and probabilities open): that is the first surely occupied
+//!   voxel ([`CONFIDENT`]) seen from the shelf's entrance in each (x, z) column. A push starts before a random point of it and goes towards a random likely occupied voxel
 //!   within [`REACH_M`] of the point, never back towards the entrance.
-//! * Before what is hidden: a contact may be at any side but the back of what surely stands at the tool's height, the likelier
-//!   the more space behind it no look has seen; its direction is any that has room for the tip before the contact, from
-//!   across and 20 degrees back to the same on the other side.
+//! * Before hidden space: a contact may be at the front or a side of what surely stands at the tool's height. A contact
+//!   is the more likely the more unseen space lies behind it. Its direction is random among those that leave room for
+//!   the tip before the contact, from -20 to 200 degrees (90 is straight in).
 
 mod clearance;
+mod counterfactual;
 mod frontier;
 mod hidden;
 
 pub use clearance::{AVOIDED, ArmClearance};
+pub use counterfactual::{Counterfactual, PushTruth, REACH_DENSITY};
 pub use frontier::frontier;
 
 use crate::arm::{ArmTool, Hit, Obstacle, Push, PushMotion, level_tool};
@@ -29,9 +31,9 @@ use rand::Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Occupancy probability from which a voxel is a high-confidence one.
+/// Occupancy probability from which a voxel counts as surely occupied (high confidence).
 pub const CONFIDENT: f32 = 0.85;
-/// Occupancy probability from which a voxel is a likely one: more than a voxel that nothing is known of.
+/// Occupancy probability from which a voxel counts as likely occupied: more than that of an unknown voxel.
 pub const LIKELY: f32 = 0.6;
 /// How far before the frontier point the tip starts, metres.
 pub const STANDOFF_M: f32 = 0.02;
@@ -45,7 +47,7 @@ pub const LENGTH_M: [f32; 2] = [0.05, 0.15];
 /// check.
 pub const DRAWS_PER_CANDIDATE: usize = 4;
 
-/// Why a candidate is no candidate.
+/// Why a sampled push is not feasible.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Rejection {
@@ -64,7 +66,7 @@ pub enum Rejection {
         #[serde(flatten)]
         hit: Hit,
     },
-    /// The arm could be there, but no way from where it waits was found.
+    /// The arm could be there, but no path from the waiting configuration was found.
     NoWay,
 }
 
@@ -132,8 +134,8 @@ pub struct Candidate {
     pub motion: Option<PushMotion>,
 }
 
-/// What a push that a person thinks of would sweep: by the arm's motion for it, or by the gripper alone along it where the
-/// arm cannot carry it out.
+/// The voxels that a push proposed by a person would sweep: by the arm's motion for it, or by the gripper alone where
+/// the arm cannot carry it out.
 pub fn swept_by(arm: &ArmTool, belief: &Belief, push: &Push) -> VoxelSet {
     let clearance = ArmClearance::new(arm, belief);
     match clearance.motion(push, &clearance.target_of(push), &mut stream(0, "push to look at", 0)) {
@@ -157,7 +159,7 @@ pub enum PushSampler {
     /// From the frontier into the shelf, as in the paper.
     #[default]
     Frontier,
-    /// From the front or a side of what stands before space that no look has seen.
+    /// At the front or a side of objects before unseen space.
     Hidden,
 }
 

@@ -2,14 +2,15 @@
 //!
 //! Everything is counted in the scored volume, the grid below [`SCORED_HEIGHT_M`], so that the empty air above does not
 //! flatter. [`Scores::of`] judges one belief; a [`Tally`] keeps the counts behind the scores, and tallies merged over a
-//! set of scenes give the set's scores from one confusion matrix. [`object_verdicts`] says what became of each object;
-//! [`Interval`] is a mean over scenes with its confidence interval; [`scores_without`] tells what could be known without
-//! some objects.
+//! set of scenes give the set's scores from one confusion matrix. [`object_verdicts`] gives the verdict on each object;
+//! [`Interval`] is a mean over scenes with its confidence interval; [`scores_without`] gives the scores of a perfect
+//! map that lacks some objects.
 
 mod confusion;
 mod interval;
 mod known;
 mod objects;
+mod rank;
 mod reliability;
 mod tally;
 
@@ -17,6 +18,7 @@ pub use confusion::Confusion;
 pub use interval::{Interval, RESAMPLES, deviation, mean};
 pub use known::scores_without;
 pub use objects::{SPECK_M2, object_verdicts};
+pub use rank::rank_correlation;
 pub use reliability::{BIN_COUNT, Reliability, ReliabilityBin};
 pub use tally::Tally;
 
@@ -53,7 +55,7 @@ impl Scores {
     }
 }
 
-/// What became of an object in the belief.
+/// The verdict on an object in the belief.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {

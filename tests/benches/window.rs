@@ -8,7 +8,9 @@ use egui_kittest::Harness;
 use nudge::workbench::app::{App, Options};
 use nudge::workbench::command::Command;
 use nudge::workbench::half_belief::HalfBelief;
+use nudge::workbench::model::StartForm;
 use nudge::workbench::session::Moment;
+use nudge_core::belief::CLASSICAL;
 use nudge_tests::{nudge_bin, root};
 use re_viewer::external::egui;
 use std::process::Stdio;
@@ -27,7 +29,9 @@ fn main() {
         .wgpu_setup(setup)
         .build_eframe(move |cc| App::new(cc, options.clone()));
     println!("{:<62} {:>10}  {:>10}", "the window at 1600 x 900", "measured", "target");
-    harness.state_mut().model.kept.form.budget = BUDGET;
+    // The networks would be most of what is measured.
+    let form = &mut harness.state_mut().model.kept.form;
+    *form = StartForm { budget: BUDGET, ..form.clone().with_belief(CLASSICAL) };
     harness.state_mut().ask(Command::Open(root().join(SCENE)));
     step_until(&mut harness, |app| !app.is_busy());
     run(&mut harness);

@@ -31,12 +31,21 @@ pub fn nudge_ok(args: &[&str]) -> String {
     text(&output.stdout)
 }
 
-/// Runs `nudge`, expects exit code `code` and one line on stderr, and returns that line.
+/// Whether a line tells how far long work is: `regress: 3/14, 2.0 s each, about 22 s left`.
+pub fn is_progress(line: &str) -> bool {
+    let Some((_, said)) = line.split_once(": ") else { return false };
+    let share = said.split([',', ' ']).next().and_then(|share| share.split_once('/'));
+    let is_number = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_ascii_digit());
+    share.is_some_and(|(done, of)| is_number(done) && is_number(of))
+        && (said.contains(" in ") || said.ends_with(" left"))
+}
+
+/// Runs `nudge`, expects exit code `code` and one line on stderr that tells no progress, and returns that line.
 pub fn nudge_fails(code: i32, args: &[&str]) -> String {
     let output = nudge(args);
     let stderr = text(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "nudge {args:?}: {stderr}");
-    let lines: Vec<&str> = stderr.lines().filter(|line| !line.starts_with("warning:")).collect();
+    let lines: Vec<&str> = stderr.lines().filter(|line| !line.starts_with("warning:") && !is_progress(line)).collect();
     assert_eq!(lines.len(), 1, "nudge {args:?} should say one line, said: {stderr}");
     lines[0].to_owned()
 }
@@ -56,4 +65,44 @@ pub fn venv_tool(name: &str) -> Option<PathBuf> {
     let tool = Path::new(&venv).join("bin").join(name);
     assert!(tool.exists(), "{} is missing", tool.display());
     Some(tool)
+}
+
+/// What a command did on a disk of a few megabytes.
+pub struct OnSmallDisk {
+    /// What it said.
+    pub output: Output,
+    /// The names of what it left on the disk.
+    pub left: Vec<String>,
+}
+
+/// Runs a command while a disk of so many megabytes is mounted at `folder`, seen by that command alone. `None`, with a word
+/// on stderr, where the system lets nobody mount one.
+pub fn with_small_disk(folder: &Path, megabytes: u32, command: Command) -> Option<OnSmallDisk> {
+    let listing = tempfile::NamedTempFile::new().expect("a file");
+    let mount = format!("mount -t tmpfs -o size={megabytes}m tmpfs \"$1\"");
+    let script =
+        format!("{mount} || exit 77\nat=$1 list=$2\nshift 2\n\"$@\"\ncode=$?\nls -A \"$at\" >\"$list\"\nexit $code");
+    let mut around = in_own_mounts(&script);
+    around.arg(folder).arg(listing.path()).arg(command.get_program()).args(command.get_args());
+    for (name, value) in command.get_envs() {
+        match value {
+            Some(value) => around.env(name, value),
+            None => around.env_remove(name),
+        };
+    }
+    let output = around.output().expect("unshare starts");
+    if output.status.code() == Some(77) || text(&output.stderr).starts_with("unshare:") {
+        eprintln!("not checked: this system lets nobody mount a small disk: {}", text(&output.stderr).trim());
+        return None;
+    }
+    let left = std::fs::read_to_string(listing.path()).expect("a list").lines().map(str::to_owned).collect();
+    Some(OnSmallDisk { output, left })
+}
+
+/// A shell script that may mount what nobody else sees; its arguments follow.
+pub fn in_own_mounts(script: &str) -> Command {
+    let mut command = Command::new("unshare");
+    // Who is not root becomes it, as far as these mounts go.
+    command.args(["--map-root-user", "--mount", "bash", "-c", script, "bash"]);
+    command
 }

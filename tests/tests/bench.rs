@@ -248,11 +248,196 @@ fn the_gate_holds_what_was_blessed_and_trips_on_what_changed() {
     score["golden"] = Value::from(score["golden"].as_f64().expect("number") + 1.5 * tolerance);
     std::fs::write(&golden, changed.to_string()).expect("write");
     let line = nudge_fails(1, &["regress", "--golden", &golden]);
-    assert!(line.contains("1 of 14") && line.contains(&name), "{line}");
+    assert!(line.contains("1 of 20") && line.contains(&name), "{line}");
     let said = text(&gate(&["--bless"]).stdout);
     assert!(said.contains("was ") && gate(&[]).status.success(), "{said}");
 
     std::fs::write(&golden, "{ \"format\": 1,\n \"scene\": [] }").expect("write");
     assert!(nudge_fails(2, &["regress", "--golden", &golden]).contains("golden.json: line 2"));
     assert!(nudge_fails(2, &["regress", "--golden", "/nowhere.json"]).contains("/nowhere.json"));
+}
+
+/// Changes a JSON document.
+fn edit(path: &Path, change: impl FnOnce(&mut Value)) {
+    let mut document = document(path);
+    change(&mut document);
+    std::fs::write(path, document.to_string()).expect("written");
+}
+
+fn document(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).expect("read")).expect("JSON")
+}
+
+#[test]
+fn a_bench_names_what_made_it_and_is_not_gone_on_with_otherwise() {
+    let bench = Bench::new();
+    let out = bench.name("b");
+    bench.run("b", &[]);
+    let file = bench.path("b/bench.json");
+    let whole = document(&file);
+    let made_by = &whole["made_by"];
+    assert_eq!((&made_by["version"], &made_by["planner"]), (&whole["version"], &whole["planner"]));
+    assert!(made_by["commit"].as_str().is_some_and(|commit| commit.len() == 40 || commit == "unknown"), "{made_by}");
+    assert_eq!(made_by["method"].as_str().map(str::len), Some(64));
+    assert!(made_by["threads"].as_u64().is_some_and(|threads| threads > 0) && made_by.get("weights").is_none());
+    let episode = "b/episodes/small/left/mem-0.json";
+    assert_eq!(document(&bench.path(episode))["made_by"], made_by["fingerprint"]);
+
+    // An unfinished bench of other weights, of other code, or with other settings.
+    std::fs::remove_file(bench.path(episode)).expect("removed");
+    let refused = |more: &[&str], words: &str| {
+        let before = std::fs::read(&file).expect("read");
+        let line = nudge_fails(2, &bench.args(&out, more));
+        assert!(line.contains(words) && line.contains("--allow-mixed"), "{line}");
+        assert!(std::fs::read(&file).expect("read") == before && !bench.path(episode).exists());
+    };
+    refused(&["--patience", "3"], "--patience was 1, now it is 3");
+    edit(&file, |bench| bench["made_by"]["method"] = "0".repeat(64).into());
+    refused(&[], "the method's source was 000000000000, now it is ");
+    edit(&file, |bench| {
+        *bench = whole.clone();
+        bench["made_by"]["weights"] = serde_json::json!({ "sigma_o": "0".repeat(64) });
+    });
+    refused(&[], "the weights sigma_o were 000000000000, now they are absent");
+    edit(&file, |bench| drop(bench.as_object_mut().expect("an object").remove("made_by")));
+    refused(&[], "some of the results do not tell what made them");
+
+    // Another commit with the same code of the method goes on, and threads are nobody's business.
+    edit(&file, |bench| {
+        *bench = whole.clone();
+        bench["made_by"]["commit"] = "0".repeat(40).into();
+        bench["made_by"]["threads"] = 99.into();
+    });
+    nudge_ok(&bench.args(&out, &[]));
+    let also = document(&file)["also_made_by"].clone();
+    assert!(also[0]["mixed"] == false && also.as_array().map(Vec::len) == Some(1), "{also}");
+
+    // Who insists is noted, in bench.json, in the result and in the report.
+    edit(&file, |bench| *bench = whole.clone());
+    std::fs::remove_file(bench.path(episode)).expect("removed");
+    let said = nudge(&bench.args(&out, &["--patience", "3", "--allow-mixed"]));
+    let warning = text(&said.stderr);
+    let words = "--patience was 1, now it is 3";
+    assert!(said.status.success() && warning.starts_with("warning: ") && warning.contains(words), "{warning}");
+    let also = document(&file)["also_made_by"][0].clone();
+    assert!(also["mixed"] == true && also["differs"][0] == words, "{also}");
+    assert_eq!(document(&bench.path(episode))["made_by"], also["made_by"]["fingerprint"]);
+    assert_ne!(also["made_by"]["fingerprint"], made_by["fingerprint"]);
+    let markdown = nudge_ok(&["report", &out, "--markdown"]);
+    assert!(markdown.contains("**Mixed: ") && markdown.contains(words), "{markdown}");
+    nudge_ok(&["report", &out]);
+    let page = std::fs::read_to_string(bench.path("b/report/index.html")).expect("page");
+    assert!(page.contains("class=\"warning\">Mixed: "));
+    // A result of a maker that the bench does not know belongs to another bench.
+    edit(&bench.path(episode), |result| result["made_by"] = "0123456789abcdef".into());
+    assert!(nudge_fails(2, &["report", &out]).contains("mem-0.json"));
+}
+
+#[test]
+fn shards_made_otherwise_merge_only_when_told() {
+    let bench = Bench::new();
+    for shard in ["0/2", "1/2"] {
+        bench.run(&format!("part-{}", &shard[..1]), &["--shard", shard]);
+    }
+    let parts = ["part-0", "part-1"].map(|part| bench.name(part));
+    // Other threads, and a checkout with changes: as one run all the same.
+    edit(&bench.path("part-1/bench.json"), |plan| {
+        plan["made_by"]["threads"] = 99.into();
+        plan["made_by"]["dirty"] = Value::from(plan["made_by"]["dirty"] != true);
+    });
+    bench.run("whole", &[]);
+    nudge_ok(&["bench", "merge", &parts[1], &parts[0], "--out", &bench.name("merged")]);
+    let read = |name: &str| std::fs::read(bench.path(name)).expect("bench.json");
+    assert!(read("merged/bench.json") == read("whole/bench.json"));
+
+    edit(&bench.path("part-1/bench.json"), |plan| plan["made_by"]["method"] = "0".repeat(64).into());
+    let mixed = bench.name("mixed");
+    let words = ["bench", "merge", &parts[0], &parts[1], "--out", &mixed];
+    let line = nudge_fails(2, &words);
+    let difference = "the method's source was ";
+    assert!(line.contains("part-1") && line.contains(difference) && line.contains("--allow-mixed"), "{line}");
+    assert!(!bench.path("mixed").exists());
+    nudge_ok(&[&words[..], &["--allow-mixed"]].concat());
+    let also = document(&bench.path("mixed/bench.json"))["also_made_by"].clone();
+    assert!(also[0]["mixed"] == true && also[0]["made_by"]["method"] == "0".repeat(64), "{also}");
+    assert_eq!(files(&bench.path("mixed/episodes")), files(&bench.path("whole/episodes")));
+}
+
+/// The rows of the Markdown table whose header has a title, by their first cell, as a map of titles to cells.
+fn table(markdown: &str, title: &str) -> BTreeMap<String, BTreeMap<String, String>> {
+    let cells = |line: &str| -> Vec<String> {
+        line.trim_matches('|').split('|').map(|cell| cell.trim().replace(['*', '`'], "")).collect()
+    };
+    let mut lines =
+        markdown.lines().skip_while(|line| !(line.starts_with('|') && cells(line).iter().any(|c| c == title)));
+    let titles = cells(lines.next().unwrap_or_else(|| panic!("no table with {title} in {markdown}")));
+    let rule = lines.next().expect("a rule");
+    assert_eq!(rule, format!("|{}", "---|".repeat(titles.len())));
+    let rows = lines.take_while(|line| line.starts_with('|')).map(cells);
+    rows.map(|row| {
+        assert_eq!(row.len(), titles.len(), "{row:?}");
+        (row[0].clone(), titles.iter().cloned().zip(row).collect())
+    })
+    .collect()
+}
+
+/// The number that a cell begins with.
+fn number(cell: &str) -> f64 {
+    cell.split(' ').next().and_then(|word| word.parse().ok()).unwrap_or_else(|| panic!("no number: {cell}"))
+}
+
+#[test]
+fn markdown_tells_the_figures_of_json_and_of_the_page() {
+    let bench = Bench::new();
+    bench.run("b", &[]);
+    let out = bench.name("b");
+    let summary: Value = serde_json::from_str(&nudge_ok(&bench.args(&out, &["--json"]))).expect("JSON");
+    let markdown = nudge_ok(&["report", &out, "--markdown"]);
+    assert!(!bench.path("b/report").exists(), "Markdown is printed, not written");
+    let (scores, actions) = (table(&markdown, "IoU at 4"), table(&markdown, "revealed"));
+    let differences = table(&markdown, "mem against");
+    let rows = summary["summary"].as_array().expect("rows");
+    assert_eq!((rows.len(), scores.len(), actions.len(), differences.len()), (2, 2, 2, 1));
+    let near = |cell: &str, value: &Value, within: f64| {
+        let value = value.as_f64().expect("a number");
+        assert!((number(cell) - value).abs() <= within, "{cell} is not {value}");
+    };
+    for row in rows {
+        let policy = row["policy"].as_str().expect("policy");
+        near(&scores[policy]["IoU at 4"], &row["occupancy_iou"], 0.000_51);
+        near(&scores[policy]["mIoU at 4"], &row["semantic_miou"], 0.000_51);
+        near(&actions[policy]["pushes per episode"], &row["pushes"], 0.051);
+        near(&actions[policy]["episodes"], &row["episodes"], 0.0);
+        match row["revealed"].as_f64() {
+            Some(share) => near(&actions[policy]["revealed"], &Value::from(100.0 * share), 0.51),
+            None => assert_eq!(actions[policy]["revealed"], "-"),
+        }
+        assert!(scores[policy]["IoU at 2"].contains('[') && actions[policy].contains_key("drops"));
+    }
+    let of = |at: usize, score: &str| rows[at][score].as_f64().expect("a score");
+    assert_eq!(rows[0]["policy"], "mem");
+    near(&differences["random"]["IoU at 4"], &Value::from(of(0, "occupancy_iou") - of(1, "occupancy_iou")), 0.000_51);
+    near(&differences["random"]["mIoU at 4"], &Value::from(of(0, "semantic_miou") - of(1, "semantic_miou")), 0.000_51);
+
+    // The page has the same cells, and both say what made them.
+    let said = nudge(&["report", &out]);
+    assert!(said.status.success());
+    let page = std::fs::read_to_string(text(&said.stdout).trim()).expect("the page that was named");
+    let cells = [&scores, &actions, &differences].into_iter().flat_map(BTreeMap::values).flat_map(BTreeMap::values);
+    for cell in cells {
+        let figure = cell.split(' ').next().unwrap_or_default();
+        let note = cell.find(['(', '[']).map_or("", |at| &cell[at..]);
+        assert!(page.contains(&format!(">{figure}")) && page.contains(note), "{cell} is not on the page");
+    }
+    let made_by = document(&bench.path("b/bench.json"))["made_by"].clone();
+    let told = text(&said.stderr);
+    for fact in [&made_by["commit"], &made_by["method"], &made_by["version"]] {
+        let fact = fact.as_str().expect("text");
+        for place in [&page, &markdown, &told] {
+            assert!(place.contains(fact), "{fact} is not in {place}");
+        }
+    }
+    let settings = table(&markdown, "made by")["settings"].clone();
+    assert!(settings.values().any(|cell| cell.contains("candidates 10, ") && cell.contains("patience 1, ")));
+    assert!(told.contains("candidates 10, ") && page.contains("candidates 10, "), "{told}");
 }

@@ -1,5 +1,5 @@
 //! The networks from the command line: training, resuming, weights, and what is refused. Needs a binary built with the
-//! feature `cnabu` (make test-cnabu).
+//! feature `cnabu`, as every build has unless told.
 
 use nudge_tests::{nudge_bin, nudge_fails, nudge_ok, root, text};
 use serde_json::Value;
@@ -78,6 +78,16 @@ fn training_runs_and_the_loss_falls_and_resuming_goes_on() {
         utf8(&models),
         "--half",
     ]);
+    // Weights of one network alone are not enough to run on: no other prediction stands in for the missing one.
+    let alone = nudge_with(&models, &["run", "scenes/demo/first-look.toml", "--out", utf8(&dir.path().join("alone"))]);
+    let said = text(&alone.stderr);
+    assert!(
+        alone.status.code() == Some(2) && said.contains("sigma_m.safetensors") && said.contains("nudge train push"),
+        "{said}"
+    );
+    for file in ["sigma_m.safetensors", "sigma_m.toml"] {
+        std::fs::copy(root().join("models").join(file), models.join(file)).expect("copied");
+    }
     let out = dir.path().join("episode");
     let scene = "scenes/demo/first-look.toml";
     let run = |more: &[&str]| {
@@ -102,15 +112,98 @@ fn training_runs_and_the_loss_falls_and_resuming_goes_on() {
     );
 }
 
+/// Runs `nudge` in `folder`, where the folder of weights that it is told of does not exist.
+fn far_from_weights(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(nudge_bin());
+    command.args(args).current_dir(folder).env("NUDGE_MODELS", folder.join("no-models")).output().expect("nudge starts")
+}
+
 #[test]
-fn without_weights_the_classical_update_stands_in_and_asking_for_networks_is_refused() {
+fn without_weights_the_program_stops_and_says_how_to_get_them() {
     let dir = tempfile::tempdir().expect("tempdir");
+    let scene = root().join("scenes/demo/first-look.toml");
     let out = dir.path().join("episode");
-    let args = ["run", "scenes/demo/first-look.toml", "--budget", "1", "--json", "--out", utf8(&out)];
+    let runs: [&[&str]; 3] = [
+        &["run", utf8(&scene), "--budget", "1", "--out", utf8(&out)],
+        &["run", utf8(&scene), "--budget", "1", "--belief", "cnabu", "--out", utf8(&out)],
+        &["bench", utf8(&scene), "--policies", "mem,random-cnabu", "--budget", "1", "--out", utf8(&out)],
+    ];
+    for args in runs {
+        let said = far_from_weights(dir.path(), args);
+        let error = text(&said.stderr);
+        assert_eq!(said.status.code(), Some(2), "{args:?}: {error}");
+        assert!(error.contains("no-models") && error.contains("sigma_o.safetensors"), "{args:?}: {error}");
+        assert_eq!(error.lines().count(), 1, "{args:?}: {error}");
+        assert!(!out.exists(), "{args:?} leaves nothing half-written");
+    }
+    // The classical belief is asked for by name, and needs no weights.
+    let classical = ["run", utf8(&scene), "--budget", "1", "--belief", "classical", "--json", "--out", utf8(&out)];
+    let said = far_from_weights(dir.path(), &classical);
+    assert!(said.status.success(), "{}", text(&said.stderr));
+    let record: Value = serde_json::from_str(&text(&said.stdout)).expect("JSON");
+    assert_eq!(record["belief"], "classical");
+
     let nothing = dir.path().join("no-models");
-    let said = nudge_with(&nothing, &args);
-    assert_eq!(said.status.code(), Some(2), "a models directory that was named must be there");
-    assert!(text(&said.stderr).contains("no-models"), "{}", text(&said.stderr));
     let line = nudge_fails(2, &["calibrate", "--data", utf8(&nothing), "--models", utf8(&nothing)]);
     assert!(line.contains("no-models"), "{line}");
+}
+
+#[test]
+fn what_is_run_without_a_word_runs_on_the_networks() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("episode");
+    let said = nudge_ok(&["run", "scenes/demo/first-look.toml", "--budget", "1", "--json", "--out", utf8(&out)]);
+    let record: Value = serde_json::from_str(&said).expect("JSON");
+    assert_eq!((&record["belief"], &record["policy"]), (&Value::from("cnabu"), &Value::from("mem")));
+    let made_by = &record["made_by"];
+    for network in ["sigma_o", "sigma_m"] {
+        let file = root().join("models").join(network).with_extension("safetensors");
+        assert_eq!(made_by["weights"][network], nudge_core::files::sha256_of_file(&file).expect("read"), "{made_by}");
+    }
+    assert!(made_by["libtorch"].is_string() && made_by["device"].is_string(), "{made_by}");
+    let said = nudge_ok(&[
+        "run",
+        "scenes/demo/first-look.toml",
+        "--budget",
+        "1",
+        "--policy",
+        "random",
+        "--json",
+        "--force",
+        "--out",
+        utf8(&out),
+    ]);
+    let record: Value = serde_json::from_str(&said).expect("JSON");
+    assert_eq!(record["belief"], "classical", "the policy random is defined on the classical belief");
+}
+
+#[test]
+fn an_episode_of_other_weights_is_not_resumed_and_a_replay_says_which() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let (out, models) = (dir.path().join("episode"), dir.path().join("models"));
+    let words = ["run", "scenes/demo/first-look.toml", "--policy", "random-cnabu", "--budget", "2", "--json", "--out"];
+    let run = |models: &Path, more: &[&str]| nudge_with(models, &[&words[..], &[utf8(&out)], more].concat());
+    assert!(run(&root().join("models"), &[]).status.success());
+    let document = out.join("episode.json");
+    let mut record: Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["steps"].as_array_mut().expect("steps").pop();
+    std::fs::write(&document, record.to_string()).expect("written");
+    // The last bit of one weight.
+    std::fs::create_dir(&models).expect("folder");
+    for file in ["sigma_o.safetensors", "sigma_o.toml", "sigma_m.safetensors", "sigma_m.toml"] {
+        let mut bytes = std::fs::read(root().join("models").join(file)).expect("read");
+        let at = bytes.len() - 2;
+        if file == "sigma_o.safetensors" {
+            bytes[at] ^= 1;
+        }
+        std::fs::write(models.join(file), bytes).expect("written");
+    }
+    let said = run(&models, &["--resume"]);
+    let error = text(&said.stderr);
+    assert!(said.status.code() == Some(2) && error.contains("cannot be resumed: the weights sigma_o were "), "{error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+    let said = nudge_with(&models, &["replay", utf8(&out)]);
+    assert!(text(&said.stderr).contains("warning: ") && text(&said.stderr).contains("the weights sigma_o were "));
+    let said = run(&root().join("models"), &["--resume"]);
+    assert!(said.status.success(), "{}", text(&said.stderr));
 }

@@ -91,3 +91,22 @@ fn a_damaged_shard_is_skipped_and_named_and_a_directory_without_data_is_refused(
     assert_eq!(said.status.code(), Some(2));
     assert!(text(&said.stderr).contains("3/3"), "{}", text(&said.stderr));
 }
+
+#[test]
+fn a_log_tells_how_long_making_and_scoring_still_take() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("d");
+    let out = out.to_str().expect("utf-8");
+    let told = |args: &[&str], what: &str| {
+        let said = nudge(args);
+        let lines = text(&said.stderr);
+        assert!(said.status.success(), "{lines}");
+        let of_work: Vec<&str> = lines.lines().filter(|line| line.starts_with(what)).collect();
+        let (first, last) = (of_work.first().expect("a line for the first unit"), of_work[of_work.len() - 1]);
+        assert!(first.starts_with(&format!("{what}: ")) && first.ends_with(" left"), "{lines}");
+        assert!(last.starts_with(&format!("{what}: 3/3 in ")), "{lines}");
+        assert!(lines.lines().all(nudge_tests::is_progress), "{lines}");
+    };
+    told(&["data", "maps", "--count", "3", "--seed", "9", "--out", out], "data maps");
+    told(&["calibrate", "--data", out, "--beliefs", "classical", "--json"], "classical on views");
+}

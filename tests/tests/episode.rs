@@ -21,8 +21,10 @@ fn run(out: &Path, more: &[&str]) -> Value {
     serde_json::from_str(&nudge_ok(&words(out, more))).expect("JSON on stdout")
 }
 
-/// The record without what the clock says.
+/// The record without what the clock says, and without the number of threads.
 fn timeless(mut record: Value) -> Value {
+    assert!(record["made_by"]["threads"].as_u64().expect("threads") > 0);
+    record["made_by"]["threads"] = Value::Null;
     for step in record["steps"].as_array_mut().expect("steps") {
         step["seconds"] = Value::Null;
     }
@@ -56,6 +58,17 @@ fn two_runs_agree_and_replay_verifies_them() {
         let kind = step["action"]["kind"].as_str().expect("kind");
         assert!(if at < 3 { kind == "look" } else { kind == "look" || kind == "push" }, "step {}: {kind}", at + 1);
     }
+    let made_by = &first["made_by"];
+    let is_hash = |value: &Value, digits: usize| {
+        value.as_str().is_some_and(|text| text.len() == digits && text.chars().all(|c| c.is_ascii_hexdigit()))
+    };
+    assert_eq!(made_by["version"], first["version"]);
+    assert!(is_hash(&made_by["method"], 64), "{made_by}");
+    assert_eq!(is_hash(&made_by["commit"], 40), made_by["dirty"].is_boolean(), "{made_by}");
+    assert!(is_hash(&made_by["commit"], 40) || made_by["commit"] == "unknown", "{made_by}");
+    assert_eq!(made_by["planner"], first["planner"]);
+    assert!(made_by.get("weights").is_none() && made_by.get("libtorch").is_none(), "the classical belief has none");
+
     let entropy = |at: usize| steps[at]["scores"]["entropy_nats"].as_f64().expect("entropy");
     assert!(entropy(2) < first["prior"]["entropy_nats"].as_f64().expect("prior"));
 
@@ -130,6 +143,53 @@ fn an_episode_that_cannot_be_resumed_stays_as_it_is() {
     let line = nudge_fails(1, &words(&out, &["--budget", "3", "--resume"]));
     assert!(line.contains("cannot be resumed: step 2: displacement_m: 0.5 in the log, 0.0 now"), "{line}");
     assert!(files() == before, "recording, figure and log are those of before, and nothing is left over");
+}
+
+/// An episode with one step left, whose record is changed.
+fn with_a_step_left(out: &Path, change: impl FnOnce(&mut Value)) {
+    run(out, &["--budget", "3"]);
+    let document = out.join("episode.json");
+    let mut record: Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["steps"].as_array_mut().expect("steps").pop();
+    change(&mut record);
+    std::fs::write(&document, record.to_string()).expect("written");
+}
+
+#[test]
+fn an_episode_of_other_weights_or_settings_is_not_resumed_and_says_which() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("e");
+    with_a_step_left(&out, |record| record["made_by"]["weights"] = serde_json::json!({ "sigma_o": "0".repeat(64) }));
+    let before = std::fs::read(out.join("episode.json")).expect("read");
+    let line = nudge_fails(2, &words(&out, &["--budget", "3", "--resume"]));
+    assert!(line.contains("cannot be resumed: the weights sigma_o were 000000000000, now they are absent"), "{line}");
+    let line = nudge_fails(2, &words(&out, &["--budget", "3", "--resume", "--patience", "3"]));
+    assert!(line.contains("--patience 1, not 3"), "{line}");
+    assert!(std::fs::read(out.join("episode.json")).expect("read") == before);
+    // A replay says so first, and then what came of it: here nothing, since the classical belief has no weights.
+    let said = nudge_tests::nudge(&["replay", out.to_str().expect("utf-8")]);
+    let warning = text(&said.stderr);
+    assert!(said.status.success() && warning.contains("warning: ") && warning.contains("sigma_o"), "{warning}");
+}
+
+#[test]
+fn steps_of_another_program_say_so() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("e");
+    let other = "0".repeat(40);
+    with_a_step_left(&out, |record| record["made_by"]["commit"] = other.clone().into());
+    let resumed = run(&out, &["--budget", "3", "--resume"]);
+    assert_eq!(resumed["made_by"]["commit"], other);
+    let later = resumed["also_made_by"].as_array().expect("another program");
+    assert_eq!((later.len(), later[0]["from_step"].as_u64()), (1, Some(3)));
+    assert_ne!(later[0]["made_by"]["commit"], other);
+    // Episodes of programs that did not tell go on all the same.
+    let old = dir.path().join("old");
+    with_a_step_left(&old, |record| drop(record.as_object_mut().expect("an object").remove("made_by")));
+    let resumed = run(&old, &["--budget", "3", "--resume"]);
+    assert!(resumed.get("made_by").is_none() && resumed["steps"].as_array().map(Vec::len) == Some(3));
+    assert_eq!(resumed["also_made_by"][0]["from_step"], 3);
+    assert!(nudge_ok(&["replay", old.to_str().expect("utf-8")]).contains("bit for bit"));
 }
 
 #[test]

@@ -66,7 +66,7 @@ fn new_scene_opens_and_has_a_thumbnail() {
 }
 
 #[test]
-fn the_standard_array_has_the_published_poses() {
+fn the_standard_array_has_the_poses_of_the_design() {
     let array: Value = serde_json::from_str(&nudge_ok(&["views", "--json"])).expect("JSON");
     let views = array["views"].as_array().expect("views");
     assert_eq!(views.len(), 300);

@@ -9,22 +9,33 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 const SCENE: &str = "scenes/demo/behind-the-boxes.toml";
+/// The crowded shelf of `make demo`: pushes bring hidden cans into sight.
+const DEMO: &str = "scenes/high/can-phalanx.toml";
 /// Share of a picture's pixels that may look other than they did.
 const TOLERANCE: f64 = 0.02;
 /// How much a colour may differ, of 255, before its pixel looks other.
 const FAINT: u8 = 24;
 
-/// Episodes of two policies to look at, made once for all tests of this process.
+/// The demo's shelf, mapped with pushes and without, made once for all tests of this process.
 static EPISODES: LazyLock<(tempfile::TempDir, [PathBuf; 2])> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("folder");
-    let episodes = ["random-push-5", "random"].map(|policy| {
-        let out = folder.path().join(policy);
-        let path = out.to_str().expect("utf-8");
-        let args = ["run", SCENE, "--belief", "classical", "--budget", "10", "--seed", "1", "--candidates", "30"];
-        nudge_ok(&[&args[..], &["--policy", policy, "--out", path]].concat());
-        out
-    });
-    (folder, episodes)
+    let out = folder.path().join("demo");
+    let path = out.to_str().expect("utf-8");
+    nudge_ok(&[
+        "run",
+        DEMO,
+        "--policy",
+        "mem",
+        "--beside",
+        "mem-no-push",
+        "--budget",
+        "12",
+        "--seed",
+        "0",
+        "--out",
+        path,
+    ]);
+    (folder, [out.clone(), out.with_file_name("demo-mem-no-push")])
 });
 
 /// A socket of the internet's protocols that a process holds.
@@ -279,4 +290,36 @@ fn export_of(episode: &Path, into: &Path) -> nudge::workbench::session::Session 
     let session = harness.state().model.session().expect("open").clone();
     nudge::workbench::export::write_episode(&session, into, &|_| true).expect("exported");
     session
+}
+
+#[test]
+fn an_episode_of_networks_is_shown_where_their_weights_are_broken() {
+    let dir = tempfile::tempdir().expect("folder");
+    let (out, models) = (dir.path().join("episode"), dir.path().join("models"));
+    let path = out.to_str().expect("utf-8");
+    nudge_ok(&["run", "scenes/demo/first-look.toml", "--belief", "classical", "--budget", "1", "--out", path]);
+    let document = out.join("episode.json");
+    let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(&document).expect("read")).expect("JSON");
+    record["belief"] = "cnabu".into();
+    std::fs::write(&document, record.to_string()).expect("written");
+    std::fs::create_dir(&models).expect("folder");
+    for file in ["sigma_o.safetensors", "sigma_o.toml", "sigma_m.safetensors", "sigma_m.toml"] {
+        let bytes = std::fs::read(root().join("models").join(file)).expect("read");
+        let kept = if file == "sigma_o.safetensors" { bytes.len() / 3 } else { bytes.len() };
+        std::fs::write(models.join(file), &bytes[..kept]).expect("written");
+    }
+    let picture = dir.path().join("shown.png");
+    let shot = Command::new(nudge_bin())
+        .current_dir(root())
+        .env("NUDGE_MODELS", &models)
+        .args(["shot", path, "--size", "1440x900", "--out", picture.to_str().expect("utf-8")])
+        .output()
+        .expect("nudge starts");
+    assert!(shot.status.success(), "{}", text(&shot.stderr));
+    assert!(image::open(&picture).expect("a picture").into_rgb8().width() == 1440);
+    // To go on with it is another thing.
+    let replay =
+        Command::new(nudge_bin()).env("NUDGE_MODELS", &models).args(["replay", path]).output().expect("starts");
+    let said = text(&replay.stderr);
+    assert!(replay.status.code() == Some(2) && said.contains("sigma_o.safetensors"), "{said}");
 }

@@ -12,6 +12,8 @@ mod ease;
 mod explain;
 #[path = "workbench/random.rs"]
 mod random;
+#[path = "workbench/sight.rs"]
+mod sight;
 #[path = "workbench/step.rs"]
 mod step;
 #[path = "workbench/window.rs"]

@@ -1,5 +1,6 @@
-//! Joining the directories of shards into one bench.
+//! Merging the directories of shards into one bench.
 
+use super::makers::Mixing;
 use super::plan::Plan;
 use super::store::BenchDir;
 use nudge_core::files::temporary_of;
@@ -12,21 +13,27 @@ use std::path::{Path, PathBuf};
 /// Merges the shards in `parts` into a new directory, the same as if one process had run all of it; returns its plan.
 ///
 /// # Errors
-/// For shards of different plans or versions, shards that overlap, are missing or unfinished (each named), and for an
-/// output directory that is there already. Nothing is written then.
-pub fn merge(parts: &[PathBuf], out: &Path) -> Result<Plan> {
+/// For shards of different plans, shards that were made otherwise (unless they may be mixed), shards that overlap, are
+/// missing or unfinished (each named), and for an output directory that is there already. Nothing is written then.
+pub fn merge(parts: &[PathBuf], out: &Path, mixing: Mixing) -> Result<Plan> {
     if fs::exists(out).map_err(|error| Error::io(out, error))? {
         return Err(Error::input(out, "", "is there already; choose a new directory to merge into"));
     }
     let shards = open(parts)?;
-    let (_, (_, _, first)) = shards.first_key_value().ok_or_else(|| Error::Usage("no shards to merge".to_owned()))?;
-    let whole = Plan { shard: None, ..first.clone() };
+    let (_, (first_part, _, first)) =
+        shards.first_key_value().ok_or_else(|| Error::Usage("no shards to merge".to_owned()))?;
+    let mut whole = Plan { shard: None, ..first.clone() };
     for (part, directory, plan) in shards.values() {
         let same = Plan { shard: None, ..plan.clone() };
         if let Some(difference) = same.difference(&whole) {
-            let message = format!("does not belong to the bench in {}: {difference}", parts[0].display());
+            let message = format!("does not belong to the bench in {}: {difference}", first_part.display());
             return Err(Error::input(part, "", message));
         }
+        whole.join(&same, mixing).map_err(|words| {
+            let message =
+                format!("was made otherwise than {}: {words}; --allow-mixed merges all the same", first_part.display());
+            Error::input(part, "", message)
+        })?;
         let missing = directory.missing(plan)?;
         if let Some(first) = missing.first() {
             let of = plan.episodes().len();

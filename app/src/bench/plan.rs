@@ -1,6 +1,9 @@
 //! What a bench consists of: sets of scenes, policies, seeds, a budget, and which share of it is this shard's.
 
+use super::makers::AlsoMadeBy;
+use nudge_core::camera::NoiseModel;
 use nudge_core::files::names_in;
+use nudge_core::made_by::MadeBy;
 use nudge_core::plan::{PlannerSettings, PolicyKind};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::shard::Shard;
@@ -19,14 +22,23 @@ pub struct Plan {
     pub format: u32,
     /// Version of the program that began it.
     pub version: String,
+    /// What made its results; not there in benches of programs that did not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_by: Option<MadeBy>,
+    /// What else made some of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_made_by: Vec<AlsoMadeBy>,
     /// Number of actions of every episode.
     pub budget: usize,
     /// Seeds 0 to `seeds - 1`, for policies that draw at random; the others run once.
     pub seeds: u64,
     /// Name of the view array.
     pub views: String,
-    /// The planner's numbers.
+    /// The planner's numbers, of policies that have no own.
     pub planner: PlannerSettings,
+    /// What the camera gets wrong; nothing unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<NoiseModel>,
     /// The policies, in the order of tables.
     pub policies: Vec<PolicyPlan>,
     /// The sets.
@@ -45,6 +57,9 @@ pub struct PolicyPlan {
     pub policy: PolicyKind,
     /// Name of the belief update.
     pub belief: String,
+    /// The planner's numbers, where its belief is best served by others than the plan's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub planner: Option<PlannerSettings>,
 }
 
 /// A set of scenes.
@@ -127,19 +142,26 @@ impl Plan {
         Path::new(&set.name).join(&set.scenes[id.scene].id).join(file)
     }
 
-    /// What keeps this plan from going on with the results of `before`: the first thing that differs, in words. Where
-    /// scene files lie does not matter, and one that could not be read may have been mended.
+    /// The planner's numbers that a policy runs with.
+    pub fn planner_of(&self, policy: usize) -> &PlannerSettings {
+        self.policies[policy].planner.as_ref().unwrap_or(&self.planner)
+    }
+
+    /// Why this plan is not of the same episodes as `before`: the first thing that differs, in words. Where scene files lie
+    /// does not matter, and one that could not be read may have been mended. Whether what made their results is the same is
+    /// another question: [`Plan::join`].
     pub fn difference(&self, before: &Self) -> Option<String> {
         let policies = |plan: &Self| {
             let name = |p: &PolicyPlan| format!("{} on the {} belief", p.policy, p.belief);
             plan.policies.iter().map(name).collect::<Vec<_>>().join(", ")
         };
         let shard = |plan: &Self| plan.shard.map_or("no shard".to_owned(), |shard| format!("shard {shard}"));
+        let noise = |plan: &Self| NoiseModel::name_of(plan.noise);
         let settings: [(&str, String, String); 6] = [
-            ("version", before.version.clone(), self.version.clone()),
             ("budget", before.budget.to_string(), self.budget.to_string()),
             ("number of seeds", before.seeds.to_string(), self.seeds.to_string()),
             ("view array", before.views.clone(), self.views.clone()),
+            ("noise", noise(before), noise(self)),
             ("policies", policies(before), policies(self)),
             ("shard", shard(before), shard(self)),
         ];
@@ -147,16 +169,30 @@ impl Plan {
         if let Some((what, before, now)) = differs {
             return Some(format!("the {what} was {before}, now it is {now}"));
         }
-        self.planner_difference(before).or_else(|| self.scene_difference(before))
+        self.untold_difference(before).or_else(|| self.scene_difference(before))
     }
 
-    /// The first of the planner's numbers that differs, by its name in `bench.json`.
+    /// What differs of that which `made_by` tells, where neither has one; and of a policy's own numbers, of which it never
+    /// tells.
+    fn untold_difference(&self, before: &Self) -> Option<String> {
+        if self.made_by.is_some() || before.made_by.is_some() {
+            return (self.planner == before.planner).then(|| self.planner_difference(before)).flatten();
+        }
+        if self.version != before.version {
+            return Some(format!("the version was {}, now it is {}", before.version, self.version));
+        }
+        self.planner_difference(before)
+    }
+
+    /// The first of the planner's numbers that differs, by its option, and of which policy if not of all.
     fn planner_difference(&self, before: &Self) -> Option<String> {
-        let fields = |plan: &Self| serde_json::to_value(plan.planner).expect("numbers and names become JSON");
-        let (now, before) = (fields(self), fields(before));
-        let (name, value) = now.as_object()?.iter().find(|(name, value)| before.get(name) != Some(value))?;
-        let before = before.get(name).cloned().unwrap_or_default();
-        Some(format!("the planner's {name} was {before}, now it is {value}"))
+        let whole = self.planner.difference(&before.planner).map(|differs| (String::new(), differs));
+        let of = |at: usize| {
+            let differs = self.planner_of(at).difference(before.planner_of(at))?;
+            Some((format!(" of {}", self.policies[at].policy), differs))
+        };
+        let (of, (setting, before, now)) = whole.or_else(|| (0..self.policies.len()).find_map(of))?;
+        Some(format!("--{}{of} was {before}, now it is {now}", setting.name))
     }
 
     fn scene_difference(&self, before: &Self) -> Option<String> {
@@ -243,10 +279,10 @@ fn scene_files(path: &Path) -> Result<(String, Vec<PathBuf>)> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn plan(shard: Option<Shard>) -> Plan {
+    pub(in crate::bench) fn plan(shard: Option<Shard>) -> Plan {
         let scene = |id: &str| ScenePlan {
             id: id.to_owned(),
             file: format!("{id}.toml"),
@@ -259,14 +295,17 @@ mod tests {
                 robot: nudge_core::scene::RobotPlacement::default(),
             },
         };
-        let policy = |policy| PolicyPlan { policy, belief: "classical".to_owned() };
+        let policy = |policy| PolicyPlan { policy, belief: "classical".to_owned(), planner: None };
         Plan {
             format: FORMAT,
             version: "1".to_owned(),
+            made_by: None,
+            also_made_by: Vec::new(),
             budget: 20,
             seeds: 3,
             views: "standard300".to_owned(),
             planner: PlannerSettings::default(),
+            noise: None,
             policies: vec![policy(PolicyKind::Mem), policy(PolicyKind::Oracle)],
             sets: vec![SetPlan { name: "a".to_owned(), scenes: vec![scene("x"), scene("y")] }],
             broken: Vec::new(),
@@ -303,7 +342,19 @@ mod tests {
         assert_eq!(other.difference(&before).as_deref(), Some("the budget was 20, now it is 40"));
         let mut eager = before.clone();
         eager.planner.patience = 3.0;
-        assert_eq!(eager.difference(&before).as_deref(), Some("the planner's patience was 1.0, now it is 3.0"));
+        assert_eq!(eager.difference(&before).as_deref(), Some("--patience was 1, now it is 3"));
+        let mut own = before.clone();
+        own.policies[1].planner = Some(PlannerSettings { gamma: 0.5, ..before.planner });
+        assert_eq!(own.difference(&before).as_deref(), Some("--gamma of oracle was 0.2, now it is 0.5"));
+        let told = |plan: &Plan| Plan {
+            made_by: Some(MadeBy::new(Default::default(), None, plan.planner, 1)),
+            ..plan.clone()
+        };
+        let words = told(&own).difference(&told(&before));
+        assert_eq!(words.as_deref(), Some("--gamma of oracle was 0.2, now it is 0.5"), "no maker tells of it");
+        assert_eq!(told(&eager).difference(&told(&before)), None, "makers tell of it: `join`");
+        let noisy = Plan { noise: Some(NoiseModel::STANDARD), ..before.clone() };
+        assert_eq!(noisy.difference(&before).as_deref(), Some("the noise was none, now it is standard"));
         let mut fewer = before.clone();
         let gone = fewer.sets[0].scenes.remove(1);
         assert_eq!(fewer.difference(&before).as_deref(), Some("scene a/y is gone"));

@@ -16,6 +16,9 @@ pub struct EpisodeResult {
     pub format: u32,
     /// Version of the program that ran it.
     pub version: String,
+    /// The fingerprint of what made it, as `bench.json` tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_by: Option<String>,
     /// Name of its set.
     pub set: String,
     /// Its scene's name in the set.
@@ -36,7 +39,7 @@ pub struct EpisodeResult {
     pub prior: Scores,
     /// The steps.
     pub steps: Vec<StepResult>,
-    /// What became of the objects in the end.
+    /// The verdicts on the objects at the end.
     pub verdicts: Vec<ObjectVerdict>,
     /// The counts behind the scores after half of the budget and at the end, by number of actions.
     pub tallies: Vec<(usize, Tally)>,
@@ -55,7 +58,7 @@ pub struct StepResult {
     pub igm: f32,
     /// Disturbance of the best push, nats.
     pub reg: f32,
-    /// Gain that the view which was looked from had promised, nats; `None` for a push.
+    /// Gain that was expected of the chosen view, nats; `None` for a push.
     pub gain: Option<f32>,
     /// Scores after the step.
     pub scores: Scores,
@@ -72,11 +75,11 @@ pub struct StepResult {
 pub struct VerdictCounts {
     /// Found.
     pub found: usize,
-    /// Taken for another class.
+    /// Misclassified.
     pub misclassified: usize,
     /// Not found.
     pub not_found: usize,
-    /// Made up.
+    /// Hallucinated.
     pub hallucinated: usize,
 }
 
@@ -122,6 +125,7 @@ impl EpisodeResult {
         Self {
             format: FORMAT,
             version: record.version.clone(),
+            made_by: plan.made_by.as_ref().map(|maker| maker.fingerprint.clone()),
             set: set.name.clone(),
             scene: set.scenes[id.scene].id.clone(),
             policy: record.config.policy,
@@ -137,10 +141,11 @@ impl EpisodeResult {
         }
     }
 
-    /// Whether this is the result of an episode of a plan, whole and of the same program.
+    /// Whether this is the result of an episode of a plan, whole and of one of its makers.
     pub fn belongs_to(&self, plan: &Plan, id: EpisodeId) -> bool {
         let (set, policy) = (&plan.sets[id.set], &plan.policies[id.policy]);
-        (self.format, &self.version) == (FORMAT, &plan.version)
+        self.format == FORMAT
+            && plan.knows(&self.version, self.made_by.as_deref())
             && (&self.set, &self.scene) == (&set.name, &set.scenes[id.scene].id)
             && (self.policy, &self.belief, self.seed) == (policy.policy, &policy.belief, id.seed)
             && (self.budget, self.steps.len()) == (plan.budget, plan.budget)

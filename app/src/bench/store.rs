@@ -9,6 +9,7 @@
 //!
 //! Every file is there whole or not at all; an episode counts as finished when its result is there.
 
+use super::makers::Mixing;
 use super::plan::{EpisodeId, FORMAT, Plan};
 use super::result::{EpisodeResult, EpisodeSeconds};
 use nudge_core::files::{TEMPORARY, names_in, remove_if_there, write_atomically};
@@ -48,6 +49,15 @@ impl BenchDir {
     /// For a directory that holds something else, a bench of another plan (what differs is named), and one that another
     /// process is writing.
     pub fn prepare(path: &Path, plan: &Plan) -> Result<Self> {
+        Ok(Self::go_on(path, plan, Mixing::Refused)?.0)
+    }
+
+    /// The same, for results that may be mixed with those of other makers. Gives the plan as it is filed beside it: what
+    /// began the bench stays its `made_by`, and what goes on with it is noted.
+    ///
+    /// # Errors
+    /// Those of [`Self::prepare`], and for results made otherwise, unless they may be mixed.
+    pub fn go_on(path: &Path, plan: &Plan, mixing: Mixing) -> Result<(Self, Plan)> {
         if path.exists() && !path.is_dir() {
             return Err(Error::input(path, "", "is a file, not a directory"));
         }
@@ -59,15 +69,30 @@ impl BenchDir {
         }
         fs::create_dir_all(path).map_err(|error| Error::io(path, error))?;
         let directory = Self { path: path.to_owned(), _lock: lock(path)? };
+        let mut filed = plan.clone();
         if has_plan {
             let before = directory.plan()?;
             if let Some(difference) = plan.difference(&before) {
                 let message = format!("holds another bench: {difference}; choose another --out");
                 return Err(Error::input(path, "", message));
             }
+            // A bench without results is as good as a new one.
+            if directory.missing(&before)?.len() < before.episodes().len() {
+                let (sets, broken) = (plan.sets.clone(), plan.broken.clone());
+                filed = Plan { sets, broken, ..before };
+                let mut joined = filed.clone();
+                joined.join(plan, mixing).map_err(|words| {
+                    let message = format!("holds results that were made otherwise: {words}; --allow-mixed goes on");
+                    Error::input(path, "", message)
+                })?;
+                // Who finds nothing left to do makes nothing.
+                if !directory.missing(&filed)?.is_empty() {
+                    filed = joined;
+                }
+            }
         }
-        directory.write(Path::new(DOCUMENT), plan)?;
-        Ok(directory)
+        directory.write(Path::new(DOCUMENT), &filed)?;
+        Ok((directory, filed))
     }
 
     /// The directory.
@@ -88,7 +113,7 @@ impl BenchDir {
         Ok(plan)
     }
 
-    /// Whether an episode is finished: whether its result is there and belongs to the plan.
+    /// The result of an episode, if it is finished.
     ///
     /// # Errors
     /// For a result that cannot be read or belongs to something else: nothing is overwritten in silence.

@@ -167,16 +167,16 @@ pub fn run_episode(
     catalog: Arc<Catalog>,
     recording: Option<&Path>,
 ) -> Result<(Episode, Vec<(usize, Tally)>)> {
-    let PolicyPlan { policy, belief } = &plan.policies[id.policy];
-    let (update, _) = belief_update(Some(belief), *policy)?;
+    let PolicyPlan { policy, belief, .. } = &plan.policies[id.policy];
+    let update = belief_update(Some(belief), *policy)?;
     let config = EpisodeConfig {
         policy: *policy,
         belief: belief.clone(),
         seed: id.seed,
         budget: plan.budget,
         views: plan.views.clone(),
-        planner: plan.planner,
-        noise: None,
+        planner: *plan.planner_of(id.policy),
+        noise: plan.noise,
     };
     let scene = plan.sets[id.set].scenes[id.scene].scene.clone();
     let mut tallies = Vec::new();

@@ -1,19 +1,20 @@
 //! `nudge bench`: every policy on every scene of some sets, and the shards of that put together again.
 
+use super::progress::{Progress, words};
 use super::{print, to_json, warn};
 use crate::bench::{
-    BenchDir, BrokenScene, EpisodeId, EpisodeResult, Event, Plan, PolicyPlan, SummaryRow, Workers, load_sets, merge,
-    run as work, summarise,
+    BenchDir, BrokenScene, EpisodeId, EpisodeResult, Event, Mixing, Plan, PolicyPlan, SummaryRow, Workers, load_sets,
+    merge, run as work, summarise,
 };
 use crate::driver::belief_update;
-use indicatif::{ProgressBar, ProgressStyle};
+use crate::made_by;
 use nudge_core::Error;
 use nudge_core::belief::{CLASSICAL, CNABU};
+use nudge_core::camera::NoiseModel;
+use nudge_core::made_by::MadeBy;
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
 use nudge_core::shard::Shard;
-use std::collections::BTreeMap;
-use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -41,6 +42,22 @@ struct MergeArgs {
     /// The directory to make
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    #[command(flatten)]
+    mixing: MixingArgs,
+}
+
+#[derive(clap::Args, Debug)]
+struct MixingArgs {
+    /// Let results of other weights, other code of the method or other settings of the planner stand together; bench.json
+    /// and the report say so
+    #[arg(long)]
+    allow_mixed: bool,
+}
+
+impl MixingArgs {
+    fn mixing(&self) -> Mixing {
+        if self.allow_mixed { Mixing::Allowed } else { Mixing::Refused }
+    }
 }
 
 #[derive(clap::Args, Debug)]
@@ -48,7 +65,7 @@ struct RunArgs {
     /// Sets of scenes: folders of scene files, or single files
     #[arg(required = true, value_name = "SET")]
     sets: Vec<PathBuf>,
-    /// Policies, or `all`
+    /// Policies, or `all`; of these the clairvoyant ones, oracle and clairvoyant-push, take most of the time
     #[arg(long, default_value = "all", value_delimiter = ',', value_name = "A,B")]
     policies: Vec<String>,
     /// Number of seeds; policies that draw nothing at random run once
@@ -68,6 +85,8 @@ struct RunArgs {
     /// Episodes at once [default: as many as processors and memory allow]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     jobs: Option<u16>,
+    #[command(flatten)]
+    mixing: MixingArgs,
     /// Keep every episode whole, with beliefs and recording (about 100 MB each)
     #[arg(long)]
     record: bool,
@@ -81,7 +100,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.command {
         None => run_bench(&args.run),
         Some(Command::Merge(args)) => {
-            let plan = merge(&args.parts, &args.out)?;
+            let plan = merge(&args.parts, &args.out, args.mixing.mixing())?;
+            tell_mixed(&plan);
             let (directory, _) = BenchDir::open(&args.out)?;
             let results = results(&directory, &plan, &plan.episodes())?;
             print(&table(&summarise(&results)))
@@ -96,10 +116,11 @@ fn run_bench(args: &RunArgs) -> anyhow::Result<()> {
         warn(&format!("left out: {error}"));
     }
     let out = args.out.as_deref().unwrap_or(std::path::Path::new("."));
-    let directory = BenchDir::prepare(out, &plan)?;
-    let (all, missing) = (plan.episodes(), directory.missing(&plan)?);
+    let (directory, filed) = BenchDir::go_on(out, &plan, args.mixing.mixing())?;
+    tell_mixed(&filed);
+    let (all, missing) = (plan.episodes(), directory.missing(&filed)?);
     let workers = workers(args.jobs, missing.len());
-    let mut progress = Progress::new(&plan, all.len(), missing.len(), workers, args.json);
+    let mut progress = Watch::new(&plan, all.len(), missing.len(), workers, args.json);
     let mut failed = Vec::new();
     work(&plan, &directory, &missing, workers, args.record, &mut |event| match event {
         Event::Done { id, result, seconds } => progress.done(id, &result, seconds),
@@ -110,7 +131,7 @@ fn run_bench(args: &RunArgs) -> anyhow::Result<()> {
         failed.iter().for_each(|error| eprintln!("{error}"));
         return Err(error.into());
     }
-    let summary = summarise(&results(&directory, &plan, &all)?);
+    let summary = summarise(&results(&directory, &filed, &all)?);
     if args.json {
         let broken: Vec<&str> = plan.broken.iter().map(|broken| broken.error.as_str()).collect();
         let document = serde_json::json!({ "episodes": all.len(), "summary": summary, "broken": broken });
@@ -128,22 +149,44 @@ fn run_bench(args: &RunArgs) -> anyhow::Result<()> {
     }
 }
 
+/// Warns of results that do not stand together by themselves.
+fn tell_mixed(plan: &Plan) {
+    for also in plan.also_made_by.iter().filter(|also| also.mixed) {
+        warn(&format!("the results are mixed: {}", also.differs.join("; ")));
+    }
+}
+
 fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
-    let policies = policies(args)?;
+    let mut policies = policies(args)?;
     if args.budget == 0 {
         return Err(Error::Usage("--budget must be at least one action".to_owned()).into());
     }
-    // One setting for the whole bench, so that its policies compare.
+    // What was not asked for is what serves the belief of a policy best, as in a run of the policy alone.
     let belief = if policies.iter().any(|plan| plan.belief == CNABU) { CNABU } else { CLASSICAL };
+    let planner = args.planning.planner.settings(belief)?;
+    for policy in &mut policies {
+        let own = args.planning.planner.settings(&policy.belief)?;
+        policy.planner = (own != planner).then_some(own);
+    }
+    let noise = NoiseModel::named(&args.planning.noise)?;
     let (sets, broken) = load_sets(&args.sets, &Catalog::standard())?;
     nudge_core::camera::ViewArray::named(&args.planning.views)?;
+    // All policies of a bench share the networks, if they run on any.
+    let update = policies.iter().find(|plan| plan.belief == belief);
+    let networks = match update {
+        Some(PolicyPlan { policy, belief, .. }) => belief_update(Some(belief), *policy)?.networks_used(),
+        None => None,
+    };
     Ok(Plan {
         format: crate::bench::FORMAT,
         version: nudge_core::VERSION.to_owned(),
+        made_by: Some(MadeBy::new(made_by::build(), networks, planner, processors())),
+        also_made_by: Vec::new(),
         budget: args.budget,
         seeds: args.seeds,
         views: args.planning.views.clone(),
-        planner: args.planning.planner.settings(belief),
+        planner,
+        noise,
         policies,
         sets,
         broken,
@@ -161,24 +204,11 @@ fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
             }
         }
     }
-    let mut notes: BTreeMap<String, Vec<&str>> = BTreeMap::new();
-    let mut policies = Vec::new();
-    for policy in kinds {
-        let (update, note) = belief_update(args.planning.belief.as_deref(), policy)?;
-        if let Some(note) = note {
-            // The same words for every policy are said once.
-            notes.entry(note.replace(policy.name(), "POLICY")).or_default().push(policy.name());
-        }
-        policies.push(PolicyPlan { policy, belief: update.name().to_owned() });
-    }
-    for (note, names) in notes {
-        warn(
-            &note
-                .replace("POLICY", &names.join(", "))
-                .replace(" runs on ", if names.len() > 1 { " run on " } else { " runs on " }),
-        );
-    }
-    Ok(policies)
+    let plan_of = |policy| {
+        let update = belief_update(args.planning.belief.as_deref(), policy)?;
+        Ok(PolicyPlan { policy, belief: update.name().to_owned(), planner: None })
+    };
+    kinds.into_iter().map(plan_of).collect()
 }
 
 fn results(directory: &BenchDir, plan: &Plan, episodes: &[EpisodeId]) -> nudge_core::Result<Vec<EpisodeResult>> {
@@ -192,9 +222,13 @@ fn results(directory: &BenchDir, plan: &Plan, episodes: &[EpisodeId]) -> nudge_c
 /// The workers for a number of episodes: as many as were asked for, or as processors (or `RAYON_NUM_THREADS`) and memory
 /// allow.
 pub(super) fn workers(jobs: Option<u16>, episodes: usize) -> Workers {
+    Workers::new(jobs.map(usize::from), processors(), available_memory(), episodes)
+}
+
+/// Threads that all episodes together have.
+fn processors() -> usize {
     let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse().ok()).filter(|n| *n > 0);
-    let processors = asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
-    Workers::new(jobs.map(usize::from), processors, available_memory(), episodes)
+    asked.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get))
 }
 
 /// Memory that is free to use, bytes; `None` where the system does not say.
@@ -220,10 +254,10 @@ fn table(rows: &[SummaryRow]) -> String {
     text
 }
 
-/// Tells how far a bench has come: a bar on a terminal, a line per episode in a log.
-struct Progress<'a> {
+/// Tells how far a bench has come: a bar on a terminal, and a line per episode.
+struct Watch<'a> {
     plan: &'a Plan,
-    bar: ProgressBar,
+    progress: Progress,
     quiet: bool,
     all: usize,
     missing: usize,
@@ -234,12 +268,9 @@ struct Progress<'a> {
     spent: Vec<(f64, usize, usize)>,
 }
 
-impl<'a> Progress<'a> {
+impl<'a> Watch<'a> {
     fn new(plan: &'a Plan, all: usize, missing: usize, workers: Workers, quiet: bool) -> Self {
         let mut spent = vec![(0.0, 0, 0); plan.policies.len()];
-        let bar =
-            if std::io::stderr().is_terminal() { ProgressBar::new(missing as u64) } else { ProgressBar::hidden() };
-        let style = ProgressStyle::with_template("{bar:24} {pos}/{len} {msg}").expect("a constant template");
         if !quiet {
             let Workers { jobs, threads } = workers;
             println!(
@@ -253,7 +284,7 @@ impl<'a> Progress<'a> {
         }
         Self {
             plan,
-            bar: bar.with_style(style),
+            progress: Progress::bar("bench", missing),
             quiet,
             all,
             missing,
@@ -269,25 +300,25 @@ impl<'a> Progress<'a> {
         let (sum, count, to_come) = &mut self.spent[id.policy];
         (*sum, *count, *to_come) = (*sum + seconds, *count + 1, to_come.saturating_sub(1));
         let left = self.left();
-        self.bar.set_position(self.done as u64);
-        self.bar.set_message(format!("about {left} left"));
+        self.progress.at_with(self.done, left);
         if self.quiet {
             return;
         }
         let last = result.scores(result.steps.len());
         let line = format!(
-            "{:>5}/{}  {:<48}  IoU {:.3}  mIoU {:.3}  {seconds:>6.1} s, about {left} left",
+            "{:>5}/{}  {:<48}  IoU {:.3}  mIoU {:.3}  {seconds:>6.1} s, about {} left",
             self.all - self.missing + self.done,
             self.all,
             self.plan.name(id),
             last.occupancy_iou,
-            last.semantic_miou
+            last.semantic_miou,
+            words(left)
         );
-        self.bar.suspend(|| println!("{line}"));
+        self.progress.suspend(|| println!("{line}"));
     }
 
     /// Time left, from what episodes of each policy have taken so far.
-    fn left(&self) -> String {
+    fn left(&self) -> Duration {
         let (sum, count) = self.spent.iter().fold((0.0, 0), |(sum, count), (s, c, _)| (sum + s, count + c));
         let overall = sum / f64::max(1.0, count as f64);
         let to_come: usize = self.spent.iter().map(|(_, _, to_come)| to_come).sum();
@@ -301,23 +332,13 @@ impl<'a> Progress<'a> {
             .sum();
         // Of a plan that is being gone on with, only what is missing.
         let share = (self.missing - self.done) as f64 / to_come.max(1) as f64;
-        words(Duration::from_secs_f64(seconds * share / self.jobs as f64))
+        Duration::from_secs_f64(seconds * share / self.jobs as f64)
     }
 
     fn finish(&self) {
-        self.bar.finish_and_clear();
+        self.progress.finish();
         if !self.quiet && self.done > 0 {
             println!("{} episodes in {}", self.done, words(self.started.elapsed()));
         }
-    }
-}
-
-/// A time in words: `3 h 12 min`, `5 min`, `40 s`.
-fn words(time: Duration) -> String {
-    let seconds = time.as_secs();
-    match seconds {
-        0..60 => format!("{seconds} s"),
-        60..3600 => format!("{} min", (seconds + 30) / 60),
-        _ => format!("{} h {:02} min", seconds / 3600, seconds % 3600 / 60),
     }
 }

@@ -1,8 +1,8 @@
 //! `nudge calibrate`: how good and how well calibrated belief updates are on held-out scenes, against the number of views.
 
+use super::progress::Progress;
 use crate::figure::{Calibrated, PIXELS_PER_UNIT, VIEWS, VIEWS_AFTER_PUSH, Views, calibration, escape};
 use crate::picture;
-use indicatif::ProgressBar;
 use nudge_core::Error;
 use nudge_core::belief::{BeliefUpdate, CLASSICAL, CNABU, Classical};
 use nudge_core::cnabu::{self, Scored};
@@ -87,19 +87,26 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             CNABU => {
                 let directory = args.models.clone().or_else(cnabu::models_dir);
                 let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
-                cnabu::load(&directory.ok_or_else(missing)?)?
+                cnabu::compute_beside_rayon();
+                let load = if pushes.is_some() { cnabu::load } else { cnabu::load_observation };
+                load(&directory.ok_or_else(missing)?)?
             }
             other => anyhow::bail!("unknown belief \"{other}\"; there are cnabu, classical"),
         };
-        let bar = ProgressBar::new(data.len() as u64).with_message(name.clone());
-        let tallies = evaluate(&data, &*update, &mut |done| bar.set_position(done as u64))?;
-        bar.finish_and_clear();
+        let progress = Progress::new(format!("{name} on views"), data.len());
+        let tallies = evaluate(&data, &*update, &mut |done| progress.at(done))?;
+        progress.finish();
         results.push((name.clone(), tallies));
         if let Some(pushes) = &pushes {
-            let tallies = evaluate_pushes(pushes, &*update, &*update, &mut |_| ())?;
+            let progress = Progress::new(format!("{name} on pushes"), pushes.len());
+            let tallies = evaluate_pushes(pushes, &*update, &*update, &mut |done| progress.at(done))?;
+            progress.finish();
             pushed.predictions.push((name.clone(), tallies.predicted.scores()));
             pushed.predictions.push((format!("{name}, as if nothing had changed"), tallies.unchanged.scores()));
-            pushed.afterwards.push((name.clone(), evaluate_after_pushes(pushes, &*update, &mut |_| ())?));
+            let progress = Progress::new(format!("{name} on views after pushes"), pushes.len());
+            let tallies = evaluate_after_pushes(pushes, &*update, &mut |done| progress.at(done))?;
+            progress.finish();
+            pushed.afterwards.push((name.clone(), tallies));
         }
     }
     let of_pushes = args
@@ -147,7 +154,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
 }
 
-/// What held-out pushes gave.
+/// Scores on held-out pushes.
 #[derive(Default)]
 struct Pushed {
     /// By prediction: scores on the floor cells that pushes change.

@@ -1,19 +1,15 @@
 //! `nudge data`: make training data from our own simulation.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use super::progress::Progress;
 use nudge_core::Error;
 use nudge_core::arm::ArmTool;
 use nudge_core::camera::ViewArray;
-use nudge_core::learn::{Card, Dataset, Kind, MapSample, Progress, PushSample, Recipe, Sample, Stretch, make};
+use nudge_core::learn::{Card, Dataset, Kind, MapSample, PushSample, Recipe, Sample, Stretch, make};
 use nudge_core::scene::{Catalog, GenerateConfig};
 use nudge_core::shard::Shard;
-use std::io::IsTerminal;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
-
-/// Without a terminal, a line of progress is printed this often.
-const REPORT_EVERY: Duration = Duration::from_secs(60);
+use std::sync::{Arc, OnceLock};
+use std::time::Instant;
 
 /// Make training data: random scenes, settled, observed, with truth.
 #[derive(clap::Args, Debug)]
@@ -38,7 +34,7 @@ struct MakeArgs {
     /// Seed of every sample
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Directory to write to; one that was begun is gone on with
+    /// Directory to write to; an unfinished one is continued
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Make the i-th of every n shards only, i from 0: several processes may share a directory
@@ -99,9 +95,15 @@ fn make_data<S: Sample>(args: &MakeArgs, kind: Kind) -> anyhow::Result<()> {
     };
     let card = Card::new(kind, &recipe, args.seed, args.count);
     let started = Instant::now();
-    let report = Report::new(kind);
-    let done = make::<S>(&card, &recipe, &args.out, args.shard, &|progress| report.tell(progress))?;
-    report.bar.finish_and_clear();
+    // How much is there already is told first.
+    let progress = OnceLock::new();
+    let done = make::<S>(&card, &recipe, &args.out, args.shard, &|state| {
+        let begun = || Progress::new(format!("data {kind}"), state.of).with_done(state.done);
+        progress.get_or_init(begun).at(state.done);
+    })?;
+    if let Some(progress) = progress.get() {
+        progress.finish();
+    }
     let seconds = started.elapsed().as_secs_f64();
     let data = Dataset::<S>::open(&args.out)?;
     data.skipped().iter().for_each(|skipped| super::warn(skipped));
@@ -119,45 +121,4 @@ fn make_data<S: Sample>(args: &MakeArgs, kind: Kind) -> anyhow::Result<()> {
         data.bytes_per_sample() / 1e3,
         done.made,
     ))
-}
-
-/// Tells how far it is: a bar on a terminal, else a line now and then.
-struct Report {
-    bar: ProgressBar,
-    kind: Kind,
-    started: Instant,
-    last: Mutex<Instant>,
-}
-
-impl Report {
-    fn new(kind: Kind) -> Self {
-        let style =
-            ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta} left").expect("a constant template");
-        let now = Instant::now();
-        Self {
-            bar: ProgressBar::new(0).with_style(style).with_message(kind.to_string()),
-            kind,
-            started: now,
-            last: Mutex::new(now),
-        }
-    }
-
-    fn tell(&self, progress: Progress) {
-        self.bar.set_length(progress.of as u64);
-        if progress.made == 0 {
-            self.bar.set_position(progress.done as u64);
-            self.bar.reset_eta();
-        }
-        self.bar.set_position(progress.done as u64);
-        if std::io::stderr().is_terminal() {
-            return;
-        }
-        let Ok(mut last) = self.last.lock() else { return };
-        if last.elapsed() >= REPORT_EVERY && progress.made > 0 {
-            *last = Instant::now();
-            let per_sample = self.started.elapsed().as_secs_f64() / progress.made as f64;
-            let left = (per_sample * (progress.of - progress.done) as f64 / 60.0).ceil();
-            eprintln!("{}: {}/{}, {per_sample:.2} s a sample, {left} min left", self.kind, progress.done, progress.of);
-        }
-    }
 }

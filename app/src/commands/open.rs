@@ -1,9 +1,11 @@
 //! `nudge` and `nudge open FILE`: the workbench.
 
+use crate::planner_args::ChosenLastArgs;
 use crate::workbench::app::FormOptions;
 use crate::workbench::file_kind::FileKind;
 use anyhow::Context;
-use nudge_core::plan::PolicyKind;
+use nudge_core::camera::{NoiseModel, ViewArray};
+use nudge_core::plan::{PlannerSettings, PolicyKind};
 use std::path::PathBuf;
 
 /// What was typed.
@@ -20,6 +22,12 @@ pub struct Args {
     /// Seed of every random choice (default: the one chosen last)
     #[arg(long)]
     pub seed: Option<u64>,
+    /// The view array: standard300, real75, or a file (default: the one chosen last)
+    #[arg(long)]
+    pub views: Option<String>,
+    /// What the camera gets wrong: nothing, or as much as a consumer depth camera on an arm (default: the one chosen last)
+    #[arg(long, value_name = "none|standard")]
+    pub noise: Option<String>,
     /// The folder that new episodes go to
     #[arg(long, default_value = "out")]
     pub out: PathBuf,
@@ -32,6 +40,8 @@ pub struct Args {
     /// Let other Rerun viewers on this machine look on, at 127.0.0.1 and this port; without it no port is opened
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "9876", value_parser = clap::value_parser!(u16).range(1..))]
     pub serve: Option<u16>,
+    #[command(flatten)]
+    pub planner: ChosenLastArgs,
 }
 
 /// Runs the command.
@@ -45,14 +55,26 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         // Nobody would see the message in the window.
         nudge_core::scene::Scene::load(file, &nudge_core::scene::Catalog::standard())?;
     }
+    // Wrong choices are told here, where the command line is, and not in the window.
+    args.views.as_deref().map_or(Ok(()), |views| ViewArray::named(views).map(|_| ()))?;
+    let noise = args.noise.as_deref().map(NoiseModel::named).transpose()?;
+    args.planner.0.onto(PlannerSettings::default())?;
     if let Some(port) = args.serve {
         std::net::TcpListener::bind((crate::workbench::viewer::LOOPBACK, port))
             .with_context(|| format!("--serve {port}: the port cannot be opened"))?;
     }
     let options = crate::workbench::app::Options {
         open: args.file.clone(),
-        form: FormOptions { policy: args.policy, budget: args.budget, seed: args.seed },
+        form: FormOptions {
+            policy: args.policy,
+            budget: args.budget,
+            seed: args.seed,
+            views: args.views.clone(),
+            noise,
+            planner: args.planner.0.clone(),
+        },
         out: args.out.clone(),
+        shipped_scenes: nudge_core::places::SCENES.find().map(|found| found.path),
         remember: args.picture.is_none(),
         script: args.picture.clone().map(|picture| crate::workbench::app::Script { steps: args.steps, picture }),
         serve: args.serve,

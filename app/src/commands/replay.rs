@@ -1,7 +1,7 @@
 //! `nudge replay`: re-run an episode from its log and verify every step.
 
+use super::progress::Progress;
 use crate::driver::belief_update;
-use indicatif::ProgressBar;
 use nudge_core::episode::{Agreement, EpisodeDir, replay};
 use nudge_core::scene::Catalog;
 use std::path::PathBuf;
@@ -24,11 +24,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     args.device.choose()?;
     let directory = EpisodeDir::open(&args.episode)?;
     let record = directory.record()?;
-    let (update, _) = belief_update(Some(&record.config.belief), record.config.policy)?;
-    let bar = ProgressBar::new(record.steps.len() as u64);
-    let report =
-        replay(&directory, Arc::new(Catalog::standard()), update, &mut |done, _| bar.set_position(done as u64))?;
-    bar.finish_and_clear();
+    let update = belief_update(Some(&record.config.belief), record.config.policy)?;
+    if let Some(words) = record.other_weights(&*update) {
+        super::warn(&format!("{}: {words}", args.episode.display()));
+    }
+    let progress = Progress::new("replay", record.steps.len());
+    let report = replay(&directory, Arc::new(Catalog::standard()), update, &mut |done, _| progress.at(done))?;
+    progress.finish();
     if args.json {
         super::print(&super::to_json(&report)?)?;
     } else {

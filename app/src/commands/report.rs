@@ -1,7 +1,7 @@
-//! `nudge report`: what a bench measured, as a page.
+//! `nudge report`: what a bench measured, as a page or as Markdown.
 
 use super::print;
-use crate::report::write;
+use crate::report::{Results, made_by, markdown, write};
 use std::path::PathBuf;
 
 /// What was typed.
@@ -12,14 +12,22 @@ pub struct Args {
     /// Where to write the page and its charts [default: BENCH/report]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Print the tables as Markdown instead of making the page
+    #[arg(long, conflicts_with = "out")]
+    markdown: bool,
     /// Report what is there of an unfinished bench
     #[arg(long)]
     partial: bool,
 }
 
-/// Runs the command.
+/// Runs the command. The page's path alone goes to standard output; what made the numbers is told beside it.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    let results = Results::read(&args.bench, args.partial)?;
+    if args.markdown {
+        return print(&markdown(&results)?);
+    }
     let out = args.out.clone().unwrap_or_else(|| args.bench.join("report"));
-    let index = write(&args.bench, &out, args.partial)?;
+    let index = write(&results, &args.bench, &out)?;
+    crate::output::print_error(&made_by(&results.plan).lines());
     print(&format!("{}\n", index.display()))
 }

@@ -1,4 +1,4 @@
-//! `nudge robot`: what an arm is and what it reaches.
+//! `nudge robot`: checks an arm and shows what it reaches.
 
 use super::{print, to_json, warn};
 use crate::picture;
@@ -27,7 +27,7 @@ enum Command {
     Check(CheckArgs),
 }
 
-/// Read a URDF file, and tell what the arm reaches in the shelf and which views its hand can be at
+/// Read a URDF file, and show what the arm reaches in the shelf and which views its hand can take
 #[derive(clap::Args, Debug)]
 struct CheckArgs {
     /// The arm's URDF file
@@ -68,7 +68,7 @@ struct Report {
     joints: Vec<JointReport>,
     /// From the first joint to the finger tip, every bend stretched, metres.
     stretched_m: f64,
-    /// Where the arm waits, rad or m; `null` where it reaches no place before the shelf.
+    /// The waiting configuration, rad or m; `null` where the arm reaches no place before the shelf.
     waits_at: Option<Vec<f64>>,
     reach: ReachReport,
     views: Vec<ViewsReport>,
@@ -96,7 +96,7 @@ struct ViewsReport {
     array: String,
     views: usize,
     reachable: Vec<u16>,
-    /// How many of the others are out of reach for which reason.
+    /// Number of views out of reach, by reason.
     faults: BTreeMap<String, usize>,
 }
 

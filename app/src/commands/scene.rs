@@ -1,7 +1,7 @@
 //! `nudge scene`: make, check, generate, rescale and draw scene files.
 
+use super::progress::Progress;
 use super::{print, to_json, warn};
-use indicatif::{ProgressBar, ProgressStyle};
 use nudge_core::Error;
 use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::camera::{ViewArray, hidden_objects};
@@ -47,7 +47,7 @@ struct NewArgs {
     force: bool,
 }
 
-/// Check scene files, and tell how full they are, how many objects no view shows, and how well a map can be without these
+/// Check scene files: how full they are, how many objects no view shows, and how good a map without these can be
 #[derive(clap::Args, Debug)]
 struct CheckArgs {
     /// Scene files
@@ -74,15 +74,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         Command::Rescale(args) => rescale::run(args),
         Command::Thumbnail(args) => thumbnail::run(args),
     }
-}
-
-/// A bar on standard error, when that is a terminal and there is more than one thing to wait for.
-fn progress(count: usize, what: &str) -> ProgressBar {
-    if count < 2 {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}").expect("a constant template");
-    ProgressBar::new(count as u64).with_style(style).with_message(what.to_owned())
 }
 
 fn new(args: &NewArgs) -> anyhow::Result<()> {
@@ -149,14 +140,14 @@ struct Facts {
     fill: f32,
     /// Objects unseen from every view, as `class#id`.
     hidden: Vec<String>,
-    /// What a perfect map of all the others has: what is beyond that has to be pushed free, or guessed.
+    /// Scores of a perfect map of all other objects: anything better needs pushes, or a lucky guess.
     without_hidden: Scores,
 }
 
 fn check(args: &CheckArgs) -> anyhow::Result<()> {
     let catalog = Catalog::standard();
     let views = ViewArray::named(&args.views)?;
-    let bar = progress(args.files.len(), "checking");
+    let bar = Progress::new("check", args.files.len());
     let mut documents = Vec::new();
     let mut last_error: Option<Error> = None;
     for file in &args.files {
@@ -192,9 +183,9 @@ fn check(args: &CheckArgs) -> anyhow::Result<()> {
             }
         }
         documents.push(document);
-        bar.inc(1);
+        bar.inc();
     }
-    bar.finish_and_clear();
+    bar.finish();
     if args.json {
         print(&to_json(&serde_json::json!({ "scenes": documents }))?)?;
     }

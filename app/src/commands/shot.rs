@@ -28,10 +28,10 @@ pub struct Args {
     /// The light theme
     #[arg(long)]
     light: bool,
-    /// Show the arm, so many seconds into its motion of the step before
+    /// Show the arm at this time of its last motion, in seconds
     #[arg(long, value_name = "SECONDS")]
     arm: Option<f64>,
-    /// The picture; of several, the layout's name is put behind the file's
+    /// The picture; with --layout all, the layout's name is added to the file name
     #[arg(long)]
     out: PathBuf,
 }

@@ -45,7 +45,7 @@ pub(super) struct SessionArgs {
     /// Name of the run: writes FILE.safetensors (checkpoint), FILE.toml (settings), FILE.jsonl (losses)
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Go on with the run from its checkpoint
+    /// Continue the run from its checkpoint
     #[arg(long)]
     resume: bool,
     /// Begin with the checkpoint of another run, or with finished weights (FILE.safetensors)

@@ -23,7 +23,7 @@ pub struct Views {
     pub shown: [usize; 3],
 }
 
-/// Views of a scene nobody has seen before.
+/// Views of an unseen scene, from the uniform belief on.
 pub const VIEWS: Views = Views { name: "views", first: 1, shown: [1, 3, 10] };
 /// Views of what a push left; before the first there is the prediction of the push.
 pub const VIEWS_AFTER_PUSH: Views = Views { name: "views after the push", first: 0, shown: [0, 1, 4] };

@@ -1,4 +1,4 @@
-//! Lines over a common axis, with bands and names at their ends.
+//! Line charts over a common axis, with bands, and names at the ends of the lines.
 
 use super::plot::{counting_ticks, nice_ticks};
 use super::svg::{Anchor, HAIRLINE, SOFT_INK, Stroke, Svg, Text};

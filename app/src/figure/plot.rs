@@ -10,6 +10,8 @@ pub struct Curve {
     pub name: String,
     /// Its colour.
     pub rgb: Rgb,
+    /// Lengths of dash and gap; zeros for a full line.
+    pub dash: [f32; 2],
     /// Values by step.
     pub values: Vec<f64>,
 }
@@ -69,8 +71,9 @@ impl Plot {
         svg.text(&Text::new("step", at, 10.5).anchored(Anchor::Middle).colored(SOFT_INK));
         for curve in &self.curves {
             let points: Vec<[f32; 2]> = curve.values.iter().enumerate().map(|(step, v)| [x(step), y(*v)]).collect();
-            svg.polyline(&points, Stroke::new(curve.rgb, 2.0));
-            for &step in self.marked.iter().filter(|&&step| step < points.len()) {
+            let [dash, gap] = curve.dash;
+            svg.polyline(&points, Stroke::new(curve.rgb, 2.0).dashed(dash, gap));
+            for &step in self.marked.iter().filter(|&&step| step < points.len() && dash == 0.0) {
                 svg.dot(points[step], 3.4, curve.rgb);
             }
         }

@@ -9,7 +9,7 @@ use nudge_core::belief::Belief;
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::plan::Action;
 use nudge_core::scene::{Body, Catalog, ClassId};
-use nudge_core::score::Verdict;
+use nudge_core::score::{Scores, Verdict};
 use nudge_core::world::TruthMap;
 use nudge_core::{Point, Result};
 use std::collections::BTreeSet;
@@ -36,6 +36,8 @@ pub struct Summary<'a> {
     pub start: &'a [Body],
     /// The columns of maps: usually after the first, the middle and the last step. At most three are shown.
     pub moments: &'a [Moment<'a>],
+    /// Another episode of the same scene, whose scores are drawn dashed beside this one's.
+    pub beside: Option<&'a EpisodeRecord>,
 }
 
 const WIDTH: f32 = 1240.0;
@@ -309,14 +311,27 @@ fn push_steps(record: &EpisodeRecord) -> Vec<usize> {
     record.steps.iter().filter(|step| pushed(&step.action)).map(|step| step.index).collect()
 }
 
+fn scores_of(record: &EpisodeRecord) -> Vec<Scores> {
+    std::iter::once(record.prior).chain(record.steps.iter().map(|step| step.scores)).collect()
+}
+
 /// The curves of occupancy IoU, semantic mIoU and entropy.
 fn plots(svg: &mut Svg, summary: &Summary<'_>, top: f32) {
     let record = summary.record;
-    let scores: Vec<_> = std::iter::once(record.prior).chain(record.steps.iter().map(|step| step.scores)).collect();
-    let curve = |name: &str, rgb: Rgb, value: &dyn Fn(&nudge_core::score::Scores) -> f64| Curve {
-        name: name.to_owned(),
-        rgb,
-        values: scores.iter().map(value).collect(),
+    let scores = scores_of(record);
+    let beside = summary.beside.map(|other| (other.config.policy.name(), scores_of(other)));
+    let steps = summary.beside.map_or(0, |other| other.steps.len()).max(record.steps.len());
+    // The episode itself, and the one beside it: the same colour, paler and dashed.
+    let curves = |name: &str, rgb: Rgb, value: &dyn Fn(&Scores) -> f64| -> Vec<Curve> {
+        let own = if beside.is_some() { record.config.policy.name() } else { name };
+        let mine = Curve { name: own.to_owned(), rgb, dash: [0.0; 2], values: scores.iter().map(value).collect() };
+        let other = beside.as_ref().map(|(policy, scores)| Curve {
+            name: (*policy).to_owned(),
+            rgb: colors::mix(rgb, [255; 3], 0.35),
+            dash: [5.0, 3.0],
+            values: scores.iter().map(value).collect(),
+        });
+        std::iter::once(mine).chain(other).collect()
     };
     let pushes = push_steps(record);
     let marked: Vec<usize> = summary.moments.iter().map(|moment| moment.step).collect();
@@ -324,26 +339,19 @@ fn plots(svg: &mut Svg, summary: &Summary<'_>, top: f32) {
         title: title.to_owned(),
         curves,
         range,
-        steps: record.steps.len(),
+        steps,
         pushes: pushes.clone(),
         marked: marked.clone(),
     };
     let most = scores.iter().map(|s| s.entropy_nats).fold(1.0, f64::max) / 1e3;
+    let mut occupancy = curves("mean", [31, 90, 150], &|s| s.occupancy_iou);
+    if beside.is_none() {
+        occupancy.extend(curves("occupied", [110, 168, 214], &|s| s.occupied_iou));
+    }
     let plots = [
-        plot(
-            "Occupancy IoU",
-            vec![
-                curve("mean", [31, 90, 150], &|s| s.occupancy_iou),
-                curve("occupied", [110, 168, 214], &|s| s.occupied_iou),
-            ],
-            [0.0, 1.0],
-        ),
-        plot("Semantic mIoU", vec![curve("", [20, 120, 90], &|s| s.semantic_miou)], [0.0, 1.0]),
-        plot(
-            "Map entropy, thousand nats",
-            vec![curve("", [140, 41, 129], &|s| s.entropy_nats / 1e3)],
-            [0.0, most * 1.02],
-        ),
+        plot("Occupancy IoU", occupancy, [0.0, 1.0]),
+        plot("Semantic mIoU", curves("", [20, 120, 90], &|s| s.semantic_miou), [0.0, 1.0]),
+        plot("Map entropy, thousand nats", curves("", [140, 41, 129], &|s| s.entropy_nats / 1e3), [0.0, most * 1.02]),
     ];
     let width = (WIDTH - 2.0 * MARGIN - 2.0 * 24.0) / 3.0;
     for (at, plot) in plots.iter().enumerate() {
@@ -366,13 +374,26 @@ mod tests {
         let played = fixture::play(12);
         let moments =
             [1, 6, 12].map(|step| Moment { step, belief: &played.beliefs[step], truth: &played.truths[step] });
-        let summary_of =
-            Summary { record: &played.record, catalog: &played.catalog, start: &played.bodies[0], moments: &moments };
+        let summary_of = Summary {
+            record: &played.record,
+            catalog: &played.catalog,
+            start: &played.bodies[0],
+            moments: &moments,
+            beside: None,
+        };
         let image = summary(&summary_of).expect("drawn");
         assert_eq!(image.width(), 2480);
         if let Some(kept) = std::env::var_os("NUDGE_KEEP") {
             image.save(std::path::Path::new(&kept).join("summary.png")).expect("saved");
         }
+        // Another episode beside it adds its curves, and its name.
+        let mut other = played.record.clone();
+        other.config.policy = nudge_core::plan::PolicyKind::MemNoPush;
+        other.steps.truncate(8);
+        let both = draw(&Summary { beside: Some(&other), ..summary_of }).document();
+        let alone = draw(&summary_of).document();
+        let named = |document: &str| document.matches(">mem-no-push<").count();
+        assert_eq!((named(&alone), named(&both)), (0, 3), "at the end of one curve a plot");
         // An episode without steps has a figure too.
         let mut empty = played.record.clone();
         empty.steps.clear();

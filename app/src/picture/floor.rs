@@ -9,7 +9,7 @@ use nudge_core::score::SCORED_HEIGHT_M;
 use nudge_core::world::TruthMap;
 use std::sync::LazyLock;
 
-/// A floor cell whose likeliest class is not likelier than this has not been told anything.
+/// A floor cell whose most likely class is at most this probable counts as unknown.
 const UNKNOWN_BELOW: f32 = 1.05 / CLASS_COUNT as f32;
 
 /// Where floor cells are in a picture: rows run from the back of the shelf to its front edge.
@@ -108,7 +108,7 @@ pub fn column_entropy(column: &[[f32; 2]], class: &[f32; CLASS_COUNT]) -> f32 {
     voxels + belief::dirichlet_entropy(class)
 }
 
-/// From nothing open to nothing known: the scale of [`cell_entropy`], nats.
+/// The scale of [`cell_entropy`], nats: from a certain cell to an unknown one.
 pub fn entropy_range(grid: &Grid) -> [f32; 2] {
     [0.0, grid.levels_below(SCORED_HEIGHT_M) as f32 * std::f32::consts::LN_2 + (CLASS_COUNT as f32).ln()]
 }
@@ -157,7 +157,7 @@ impl CellError {
     /// Its name in legends.
     pub fn title(self) -> &'static str {
         match self {
-            Self::Right => "right",
+            Self::Right => "correct",
             Self::Unknown => "unknown",
             Self::Missed => "missed",
             Self::Hallucinated => "hallucinated",

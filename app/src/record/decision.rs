@@ -13,6 +13,9 @@ pub struct Series {
     pub key: &'static str,
     /// Its name with unit.
     pub title: &'static str,
+    /// What it is, with its range.
+    #[cfg_attr(not(feature = "workbench"), allow(dead_code, reason = "the window shows it"))]
+    pub hint: &'static str,
     /// Its colour.
     pub rgb: [u8; 3],
     /// Its value.
@@ -21,12 +24,48 @@ pub struct Series {
 
 /// The scores that are recorded.
 pub const SERIES: &[Series] = &[
-    Series { key: "occupancy_iou", title: "occupancy IoU", rgb: [86, 156, 214], value: |s| s.occupancy_iou },
-    Series { key: "occupied_iou", title: "occupied IoU", rgb: [150, 200, 240], value: |s| s.occupied_iou },
-    Series { key: "semantic_miou", title: "semantic mIoU", rgb: [98, 196, 140], value: |s| s.semantic_miou },
-    Series { key: "entropy_nats", title: "map entropy (nats)", rgb: [220, 110, 170], value: |s| s.entropy_nats },
-    Series { key: "mece_occupancy", title: "mECE of occupancy", rgb: [240, 180, 80], value: |s| s.mece_occupancy },
-    Series { key: "mece_semantics", title: "mECE of semantics", rgb: [230, 130, 60], value: |s| s.mece_semantics },
+    Series {
+        key: "occupancy_iou",
+        title: "occupancy IoU",
+        hint: "Intersection over union of free and of occupied voxels, the mean of both, 0 to 1",
+        rgb: [86, 156, 214],
+        value: |s| s.occupancy_iou,
+    },
+    Series {
+        key: "occupied_iou",
+        title: "occupied IoU",
+        hint: "Intersection over union of occupied voxels alone, 0 to 1",
+        rgb: [150, 200, 240],
+        value: |s| s.occupied_iou,
+    },
+    Series {
+        key: "semantic_miou",
+        title: "semantic mIoU",
+        hint: "Mean intersection over union of the classes on the floor, 0 to 1",
+        rgb: [98, 196, 140],
+        value: |s| s.semantic_miou,
+    },
+    Series {
+        key: "entropy_nats",
+        title: "map entropy (nats)",
+        hint: "Entropy of the occupancy map and the semantic map together, nats; less as more is known",
+        rgb: [220, 110, 170],
+        value: |s| s.entropy_nats,
+    },
+    Series {
+        key: "mece_occupancy",
+        title: "mECE of occupancy",
+        hint: "Expected calibration error of occupancy, the mean over free and occupied, 0 (calibrated) to 1",
+        rgb: [240, 180, 80],
+        value: |s| s.mece_occupancy,
+    },
+    Series {
+        key: "mece_semantics",
+        title: "mECE of semantics",
+        hint: "Expected calibration error of the classes, the mean over them, 0 (calibrated) to 1",
+        rgb: [230, 130, 60],
+        value: |s| s.mece_semantics,
+    },
 ];
 
 /// How many views and pushes the tables list.
@@ -58,12 +97,22 @@ pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
     let mut words: Vec<String> = record.dropped.iter().map(|name| format!("dropped {name}")).collect();
     if let Some(push) = &record.push {
         if push.stalled {
-            words.push(format!("the arm was blocked after {:.0} mm of its push", push.pushed_m * 1e3));
+            words.push(format!("the arm was blocked after {} of its push", length(record).unwrap_or_default()));
         }
         words.extend(push.contacts.iter().map(|touch| format!("the arm's {} touched {}", touch.link, touch.object)));
         words.extend(push.against_wall.iter().map(|name| format!("{name} was pressed against a wall")));
     }
     words
+}
+
+/// How far a push went of what was planned: `50 of 140 mm`; of an episode that does not tell, what was planned.
+pub(crate) fn length(record: &StepRecord) -> Option<String> {
+    let Action::Push(planned) = record.action else { return None };
+    let planned_mm = planned.length_m * 1e3;
+    Some(match &record.push {
+        Some(push) => format!("{:.0} of {planned_mm:.0} mm", push.pushed_m * 1e3),
+        None => format!("{planned_mm:.0} mm"),
+    })
 }
 
 /// An action in words.
@@ -80,6 +129,7 @@ pub(crate) fn reason(reason: Reason) -> &'static str {
         Reason::LookTellsMore => "looking tells more",
         Reason::PushTellsLittle => "no push promises enough",
         Reason::PushTellsMore => "pushing tells more",
+        Reason::PushReveals => "the push really brings something hidden into sight",
         Reason::ViewOfPush => "the view that made the push worth it",
         Reason::TooEarly => "no push in the first steps",
         Reason::LastStep => "no push in the last steps",
@@ -237,6 +287,7 @@ mod tests {
     use super::*;
     use crate::fixture;
     use nudge_core::arm::{ArmTool, Push};
+    use nudge_core::episode::PushReport;
 
     #[test]
     fn the_page_of_a_push_shows_what_it_had_to_promise() {
@@ -268,6 +319,25 @@ mod tests {
         let with = page(&patient);
         assert!(with.contains("what a push has to promise | 300.0 |") && with.contains("γ·Reg ◀ | 390.0 |"), "{with}");
         assert!(!page(&PlannerSettings::default()).contains("has to promise"), "the paper's rule compares IGV itself");
+    }
+
+    #[test]
+    fn a_blocked_push_tells_how_far_it_was_to_go() {
+        let played = fixture::play(1);
+        let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.14 };
+        let mut record = played.record.steps[0].clone();
+        record.action = Action::Push(push);
+        record.push = Some(PushReport {
+            pushed_m: 0.05,
+            stalled: true,
+            contacts: Vec::new(),
+            against_wall: Vec::new(),
+            arm_in_shelf_m: 0.0,
+        });
+        assert_eq!(mishaps(&record), ["the arm was blocked after 50 of 140 mm of its push"]);
+        assert_eq!(length(&record).as_deref(), Some("50 of 140 mm"));
+        record.push = None;
+        assert_eq!(length(&record).as_deref(), Some("140 mm"));
     }
 
     #[test]

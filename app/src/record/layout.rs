@@ -32,7 +32,7 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
         ),
         space("Classes", &[paths::BELIEF_CLASSES, objects, paths::CAMERA_CURRENT, paths::PUSH_CHOSEN]),
         space("Undecided", &[paths::BELIEF_OPEN, paths::BELIEF_OCCUPANCY, paths::CAMERA_CURRENT]),
-        space("Gain", &[paths::GAIN_VOXELS, objects, paths::CAMERA_VIEWS, paths::CAMERA_CURRENT]),
+        space("Gain", &[paths::GAIN_VOXELS, paths::GAIN_LABEL, objects, paths::CAMERA_VIEWS, paths::CAMERA_CURRENT]),
         space(
             "Pushes",
             &[paths::PUSH_CANDIDATES, paths::PUSH_CHOSEN, paths::PUSH_SWEPT, paths::BELIEF_OCCUPANCY, objects],

@@ -44,8 +44,10 @@ pub const BELIEF_CERTAINTY: &str = "belief/certainty";
 pub const GAIN_VIEWS: &str = "gain/views";
 /// The chosen views in the heat maps.
 pub const GAIN_CHOSEN: &str = "gain/views/chosen";
-/// Where the chosen action's gain comes from.
+/// Where the chosen action's gain comes from: the view's, or what the push is worth.
 pub const GAIN_VOXELS: &str = "gain/voxels";
+/// What gain that is, in words.
+pub const GAIN_LABEL: &str = "gain/voxels/label";
 /// The push candidates, by value; rejected ones grey.
 pub const PUSH_CANDIDATES: &str = "push/candidates";
 /// The push of this step.

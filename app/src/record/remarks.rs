@@ -1,4 +1,4 @@
-//! What is said about a step, as pages: a person's note, and what became of each object.
+//! Remarks on a step as pages: a person's note, and the verdict on each object.
 
 use crate::verdicts::{Judged, VERDICTS, verdict_title};
 use std::fmt::Write as _;

@@ -1,4 +1,4 @@
-//! The arm: its links, the way of its tip, and the views that its hand can be at.
+//! The arm: its links, the path of its tip, and the views that its hand can reach.
 
 use super::shapes::{self, REJECTED_RGB};
 use crate::colors::Rgb;
@@ -46,7 +46,7 @@ pub fn shown_at_s(arm: &ArmTool, motion: &Motion, decision: &Decision, pushes: b
     motion.duration_s() - back
 }
 
-/// The way of the tip.
+/// The path of the tip.
 pub fn path(arm: &ArmTool, motion: &Motion) -> rerun::LineStrips3D {
     let tip = |(_, joints): (f64, Joints)| -> [f32; 3] {
         arm.arm.world_from_tool(&joints).translation.vector.map(|v| v as f32).into()
@@ -60,7 +60,7 @@ pub fn path(arm: &ArmTool, motion: &Motion) -> rerun::LineStrips3D {
         .with_radii([rerun::Radius::new_ui_points(1.8)])
 }
 
-/// Where the cameras of all views are: green where the hand can be, grey where it cannot.
+/// The camera positions of all views: green if the hand can reach them, grey if not.
 pub fn reachable(array: &ViewArray, unreachable: &[ViewId]) -> rerun::Points3D {
     let reached = |id: &ViewId| !unreachable.contains(id);
     rerun::Points3D::new(array.views.iter().map(|view| <[f32; 3]>::from(view.position().coords)))

@@ -213,6 +213,15 @@ pub fn chosen_push(push: &Push) -> rerun::Arrows3D {
         .with_radii([0.005_f32])
 }
 
+/// Words that hang at a place, metres; none for an empty text.
+pub(crate) fn words(at: [f32; 3], text: &str) -> rerun::Points3D {
+    rerun::Points3D::new((!text.is_empty()).then_some(at))
+        .with_radii([rerun::Radius::new_ui_points(0.5)])
+        .with_colors([rerun::Color::from([200, 202, 208])])
+        .with_labels((!text.is_empty()).then_some(text))
+        .with_show_labels(true)
+}
+
 fn vector(vector: Vector) -> [f32; 3] {
     vector.into()
 }

@@ -1,6 +1,8 @@
 use super::*;
 use crate::fixture;
 use nudge_core::arm::ArmTool;
+use nudge_core::gain::{Openings, RayDensity};
+use nudge_core::plan::Counted;
 
 /// Where a test keeps its output: `NUDGE_KEEP` if that is set, else a directory that goes with the guard.
 fn output() -> (PathBuf, Option<tempfile::TempDir>) {
@@ -43,7 +45,8 @@ fn a_recording_stays_small_and_names_its_entities() {
         };
         recorder.state(&setting, &state).expect("state");
         if let Some(outcome) = step.checked_sub(1).map(|at| &played.outcomes[at]) {
-            recorder.outcome(&setting, &played.beliefs[step], outcome, &[(5, 1.0), (80, 2.0)]).expect("outcome");
+            let gain = gain::Gain { nats: vec![(5, 1.0), (80, 2.0)], words: "a gain: 3 nats".to_owned() };
+            recorder.outcome(&setting, &played.beliefs[step], outcome, Some(&gain)).expect("outcome");
         }
         recorder.flush().expect("flushed");
         sizes.push(std::fs::metadata(&path).expect("file").len());
@@ -72,6 +75,7 @@ fn entities_are_named_as_the_contract_says() {
         (paths::BELIEF_CERTAINTY, "belief/certainty"),
         (paths::GAIN_VIEWS, "gain/views"),
         (paths::GAIN_VOXELS, "gain/voxels"),
+        (paths::GAIN_LABEL, "gain/voxels/label"),
         (paths::PUSH_CANDIDATES, "push/candidates"),
         (paths::PUSH_CHOSEN, "push/chosen"),
         (paths::PUSH_SWEPT, "push/swept"),
@@ -99,4 +103,35 @@ fn entities_are_named_as_the_contract_says() {
 fn a_directory_that_is_not_there_is_named() {
     let error = file_stream(Path::new("/nowhere/at/all/episode.rrd"), "x").map(|_| ()).expect_err("no such directory");
     assert!(error.to_string().starts_with("/nowhere/at/all/episode.rrd: "), "{error}");
+}
+
+#[test]
+fn a_pushs_gain_is_drawn_as_its_own_worth_and_not_as_that_of_the_view_after_it() {
+    let played = fixture::play(4);
+    let arm = ArmTool::standard(played.record.scene.shelf);
+    let (outcome, before) = (&played.outcomes[3], &played.beliefs[3]);
+    let Action::Push(push) = outcome.record.action else { panic!("the fourth action is a push") };
+    let drawn = |counted| {
+        let setting = Setting {
+            shelf: &played.record.scene.shelf,
+            catalog: &played.catalog,
+            views: &played.views,
+            budget: 4,
+            planner: &PlannerSettings { counted, ..PlannerSettings::default() },
+            arm: &arm,
+            unreachable: &[],
+        };
+        gain::of(&setting, &gain_field(before, None), outcome).expect("a gain")
+    };
+    let ids: Vec<ViewId> = played.views.views.iter().map(|view| view.id).step_by(5).collect();
+    let openings = Openings::new(&gain_field(before, None), &played.views, &ids, RayDensity::COARSE);
+    let opened = openings.under_each(outcome.prediction.as_slice())[0];
+    let gain = drawn(Counted::Unseen);
+    let sum: f32 = gain.nats.iter().map(|(_, nats)| nats).sum();
+    assert!(opened > 0.0 && (sum - opened).abs() < 1e-2 * opened, "{sum} drawn, {opened} opened");
+    assert!(gain.words.starts_with("Worth of the push, what it opens to all views together: "), "{}", gain.words);
+    let view = outcome.record.decision.candidates.iter().find(|candidate| candidate.push == push).expect("it");
+    let view = view.view.expect("a view").0;
+    let gain = drawn(Counted::All);
+    assert!(gain.words.contains(&format!("the best view after it, view {view}: ")), "{}", gain.words);
 }

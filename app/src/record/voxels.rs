@@ -1,4 +1,4 @@
-//! Sparse voxel maps: only what informs, and of that only the surface.
+//! Sparse voxel maps: only voxels that carry information, and of solid regions only the surface.
 
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture;
@@ -120,7 +120,7 @@ pub fn errors(belief: &Belief, truth: &TruthMap) -> VoxelGridMap {
     colored(grid, &shown, |index| if believed(index) { colors::HALLUCINATED_RGB } else { colors::MISSED_RGB })
 }
 
-/// The voxels that are drawn of a gain: those that tell next to nothing are left out.
+/// The voxels of a gain that are drawn: those with next to no gain are left out.
 pub(crate) fn telling(nats: &[(usize, f32)], top: f32) -> Vec<(usize, f32)> {
     nats.iter().copied().filter(|(_, nats)| *nats > 0.05 * top).collect()
 }

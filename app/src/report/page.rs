@@ -1,15 +1,15 @@
-//! The page itself: everything in one file, readable on a phone and on paper.
+//! The page itself: everything in one file, legible on a phone and on paper.
 
 use super::charts::{self, Figure, SIZE};
 use super::results::Results;
+use super::words::{self, Paragraph, count};
 use super::{scenes, tables};
-use crate::bench::{Plan, SetPlan};
+use crate::bench::SetPlan;
 use crate::figure::{PIXELS_PER_UNIT, escape};
 use crate::picture;
 use nudge_core::files::write_atomically;
 use nudge_core::scene::Catalog;
 use nudge_core::{Error, Result};
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -38,7 +38,7 @@ impl Page {
                 continue;
             }
             body += &set_title(in_set);
-            body += &scenes::without_hidden(results, set, &catalog)?;
+            body += &format!("<p>{}</p>\n", escape(&scenes::without_hidden(results, set, &catalog)?));
             body += "<div class=\"figures\">\n";
             for Figure { name, caption, chart } in charts::of_set(results, set) {
                 let svg = chart.svg(SIZE);
@@ -49,15 +49,18 @@ impl Page {
                 charts.push((name, picture::png(&svg.render(PIXELS_PER_UNIT)?)));
             }
             body += "</div>\n";
-            body += &tables::against_oracle(results, set);
-            body += &tables::scores(results, set);
-            body += &tables::differences(results, set);
-            body += &tables::actions(results, set);
-            body += &tables::verdicts(results, set);
+            if let Some(sentence) = tables::against_oracle(results, set) {
+                body += &format!("<p>{}</p>\n", escape(&sentence));
+            }
+            body += &tables::scores(results, set).html();
+            body += &tables::differences(results, set).map_or(String::new(), |table| table.html());
+            body += &tables::actions(results, set).html();
+            body += &tables::verdicts(results, set).html();
             body += &scenes::extremes(results, set, &catalog, bench_from_page)?;
         }
         let across = tables::across_sets(results);
         if !across.is_empty() {
+            let across: String = across.iter().map(|table| table.html()).collect();
             body += &format!("<h2>Out of distribution</h2>\n{across}");
         }
         body += &colophon(results);
@@ -66,53 +69,19 @@ impl Page {
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <link rel=\"icon\" href=\"data:,\">\n\
              <title>Nudge bench: {}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n",
-            escape(&set_names(plan))
+            escape(&words::set_names(plan))
         );
         Ok(Self { html, charts })
     }
 }
 
-fn set_names(plan: &Plan) -> String {
-    plan.sets.iter().map(|set| set.name.as_str()).collect::<Vec<_>>().join(", ")
-}
-
-fn count(number: usize, thing: &str) -> String {
-    format!("{number} {thing}{}", if number == 1 { "" } else { "s" })
-}
-
 fn head(results: &Results) -> String {
-    let plan = &results.plan;
-    let scenes: usize = plan.sets.iter().map(|set| set.scenes.len()).sum();
-    let mut html = format!(
-        "<h1>Nudge bench: {}</h1>\n<p>{}, {} and {} in {} of {}. A value is averaged over a scene's seeds first, then over \
-         scenes.</p>\n",
-        escape(&set_names(plan)),
-        count(scenes, "scene"),
-        if plan.policies.len() == 1 { "one policy".to_owned() } else { format!("{} policies", plan.policies.len()) },
-        count(plan.seeds as usize, "seed"),
-        count(plan.episodes().len(), "episode"),
-        count(plan.budget, "action"),
-    );
-    if results.missing > 0 {
-        let all = plan.episodes().len();
-        html += &format!(
-            "<p class=\"warning\">Unfinished: {} of {all} episodes are missing from everything below.</p>\n",
-            results.missing
-        );
-    }
-    if let Some(shard) = plan.shard {
-        html += &format!("<p class=\"warning\">This is shard {shard} only.</p>\n");
-    }
-    for broken in &plan.broken {
-        html += &format!("<p class=\"warning\">Left out: {}</p>\n", escape(&broken.error));
-    }
-    let beliefs: BTreeSet<&str> = plan.policies.iter().map(|policy| policy.belief.as_str()).collect();
-    if beliefs.len() > 1 {
-        let each: Vec<String> =
-            plan.policies.iter().map(|p| format!("{} on the {} belief", p.policy, escape(&p.belief))).collect();
-        html += &format!("<p>{}.</p>\n", each.join(", "));
-    } else if let Some(belief) = beliefs.first() {
-        html += &format!("<p>All policies on the {} belief.</p>\n", escape(belief));
+    let mut html = format!("<h1>Nudge bench: {}</h1>\n", escape(&words::set_names(&results.plan)));
+    for paragraph in words::head(results) {
+        html += &match paragraph {
+            Paragraph::Plain(words) => format!("<p>{}</p>\n", escape(&words)),
+            Paragraph::Warning(words) => format!("<p class=\"warning\">{}</p>\n", escape(&words)),
+        };
     }
     html
 }
@@ -122,25 +91,15 @@ fn set_title(set: &SetPlan) -> String {
 }
 
 fn colophon(results: &Results) -> String {
-    let plan = &results.plan;
-    format!(
-        "<footer><p>nudge {}, views {}, {} push candidates, format {}. Scores are of the volume below 0.27 m. Intervals: \
-         percentile bootstrap over scenes, {} resamples (1,000 for bands).</p></footer>\n",
-        escape(&plan.version),
-        escape(&plan.views),
-        plan.planner.candidates,
-        plan.format,
-        nudge_core::score::RESAMPLES
-    )
+    format!("<footer>{}<p>{}</p></footer>\n", words::made_by(&results.plan).html(), escape(&words::method()))
 }
 
-/// Writes the report of the bench in `bench` into `out`: the page last. Returns the page's path.
+/// Writes the report of the results of the bench in `bench` into `out`: the page last. Returns the page's path.
 ///
 /// # Errors
-/// What [`Results::read`] refuses, and what cannot be written; nothing is written before everything has been made.
-pub fn write(bench: &Path, out: &Path, partial: bool) -> Result<PathBuf> {
-    let results = Results::read(bench, partial)?;
-    let page = Page::new(&results, &way(bench, out)?)?;
+/// What cannot be written; nothing is written before everything has been made.
+pub fn write(results: &Results, bench: &Path, out: &Path) -> Result<PathBuf> {
+    let page = Page::new(results, &way(bench, out)?)?;
     fs::create_dir_all(out).map_err(|error| Error::io(out, error))?;
     for (name, png) in &page.charts {
         write_atomically(&out.join(format!("{name}.png")), png)?;

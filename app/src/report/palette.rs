@@ -18,5 +18,6 @@ pub fn of(policy: PolicyKind) -> (Rgb, [f32; 2]) {
         PolicyKind::RandomViewPush5 => ([158, 112, 0], [2.0, 4.0]),
         PolicyKind::Saturation => ([40, 130, 190], [6.0, 3.0]),
         PolicyKind::Oracle => ([0, 0, 0], [3.0, 3.0]),
+        PolicyKind::ClairvoyantPush => ([0, 0, 0], [9.0, 3.0]),
     }
 }

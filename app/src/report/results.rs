@@ -1,4 +1,4 @@
-//! What a bench measured, by set, policy and scene.
+//! The results of a bench, by set, policy and scene.
 
 use crate::bench::{BenchDir, EpisodeId, EpisodeResult, EpisodeSeconds, Plan};
 use nudge_core::plan::PolicyKind;

@@ -6,6 +6,7 @@ use crate::figure::{RasterStyle, Svg, escape};
 use crate::picture::{self, View};
 use crate::planner_args;
 use nudge_core::Result;
+use nudge_core::camera::NoiseModel;
 use nudge_core::scene::{Catalog, ObjectId};
 use nudge_core::score::{mean, scores_without};
 use std::path::Path;
@@ -15,7 +16,7 @@ const SHOWN: usize = 3;
 /// Width of a picture, pixels.
 const WIDTH: u32 = 360;
 
-/// What a set holds that no view shows, and how well a map can be that lacks it.
+/// What a set holds that no view shows, and how well a map can be that lacks it, in words.
 pub fn without_hidden(results: &Results, set: usize, catalog: &Catalog) -> Result<String> {
     let scenes = &results.plan.sets[set].scenes;
     let (mut hidden, mut iou, mut miou) = (Vec::new(), Vec::new(), Vec::new());
@@ -29,8 +30,8 @@ pub fn without_hidden(results: &Results, set: usize, catalog: &Catalog) -> Resul
         miou.push(Metric::SemanticMiou.of(&scores));
     }
     Ok(format!(
-        "<p>At the start no view shows {:.1} objects of a scene. A perfect map that lacks them has occupancy IoU {:.3} and \
-         semantic mIoU {:.3} (means over {} scenes): what is beyond that has to be pushed free, or guessed.</p>\n",
+        "At the start no view shows {:.1} objects of a scene. A perfect map that lacks them has occupancy IoU {:.3} and \
+         semantic mIoU {:.3} (means over {} scenes): what is beyond that has to be pushed free, or guessed.",
         mean(&hidden),
         mean(&iou),
         mean(&miou),
@@ -95,14 +96,16 @@ fn way_back(results: &Results, finished: &Finished, file: &str, bench_from_page:
         "standard300" => String::new(),
         other => format!(" --views {other}"),
     };
+    let noise = plan.noise.map_or(String::new(), |noise| format!(" --noise {}", NoiseModel::name_of(Some(noise))));
     format!(
-        "<code>nudge run {} --policy {} --belief {} --seed {} --budget {}{}{}</code>",
+        "<code>nudge run {} --policy {} --belief {} --seed {} --budget {}{}{}{}</code>",
         escape(file),
         result.policy,
         escape(&result.belief),
         result.seed,
         result.budget,
         escape(&views),
-        planner_args::to_type(&plan.planner, &result.belief)
+        escape(&noise),
+        planner_args::to_type(plan.planner_of(finished.id.policy), &result.belief)
     )
 }

@@ -8,19 +8,21 @@ mod take_in;
 mod tests;
 
 use super::browser::Browser;
-use super::command::Command;
+use super::command::{Command, Level};
 use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};
-use super::model::{GainSource, LayoutKind, Model, Preview, Remembered};
+use super::model::{GainSource, LayoutKind, Model, Picked, Preview, Remembered};
 use super::session::{Activity, SessionId};
 use super::space::{Drawn, Painter};
 use super::tasks::Tasks;
 use super::threads::Threads;
 use super::viewer::Viewer;
 use super::worker::{Event, Worker};
-use nudge_core::camera::ViewId;
-use nudge_core::plan::PolicyKind;
+use crate::planner_args::PlannerArgs;
+use nudge_core::arm::Push;
+use nudge_core::camera::{NoiseModel, ViewId};
+use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::Catalog;
 use re_viewer::external::{eframe, egui};
 use std::collections::{BTreeMap, BTreeSet};
@@ -40,8 +42,10 @@ pub struct Options {
     pub form: FormOptions,
     /// The folder that new episodes go to.
     pub out: PathBuf,
-    /// The folder of the scenes to choose from.
+    /// The folder of the scenes to choose from, and where new ones go.
     pub scenes: PathBuf,
+    /// The folder of the scenes that came with the program, to choose from as well.
+    pub shipped_scenes: Option<PathBuf>,
     /// Whether choices outlast the program.
     pub remember: bool,
     /// Light instead of dark; what is remembered otherwise.
@@ -67,6 +71,12 @@ pub struct FormOptions {
     pub budget: Option<usize>,
     /// Seed of every random choice.
     pub seed: Option<u64>,
+    /// The view array.
+    pub views: Option<String>,
+    /// What the camera gets wrong, `Some(None)` for nothing.
+    pub noise: Option<Option<NoiseModel>>,
+    /// The planner's settings.
+    pub planner: PlannerArgs,
 }
 
 /// Something to do before the program ends by itself.
@@ -85,6 +95,7 @@ impl Default for Options {
             form: FormOptions::default(),
             out: PathBuf::from("out"),
             scenes: PathBuf::from(super::browser::FOLDER),
+            shipped_scenes: None,
             remember: false,
             light: None,
             layout: None,
@@ -183,6 +194,24 @@ pub struct Opening {
     pub title: String,
     /// How far it is.
     pub activity: Activity,
+    /// The path to be remembered once it is open.
+    remember: Option<PathBuf>,
+    /// What a branch keeps of the episode that it comes from.
+    kept: Option<Kept>,
+}
+
+impl Opening {
+    fn of(title: String) -> Self {
+        Self { title, activity: Activity::Opening { done: 0, of: 0 }, remember: None, kept: None }
+    }
+}
+
+/// What was decided and chosen in an episode where it was branched from.
+struct Kept {
+    decision: Option<Arc<Decision>>,
+    picked: Option<Picked>,
+    view: Option<ViewId>,
+    candidate: Option<usize>,
 }
 
 /// Both ends of a channel; the first is cloned for every thread that tells something.
@@ -211,6 +240,8 @@ pub struct App {
     begun: BTreeSet<PathBuf>,
     /// The gain that was asked for last: the state and the view.
     asked_gain: Option<((SessionId, usize), ViewId)>,
+    /// The prediction that was asked for last: the state and the push.
+    asked_preview: Option<((SessionId, usize), Push)>,
     /// Where the parts of the window were drawn last, points.
     parts: Vec<(Part, egui::Rect)>,
     viewer: Option<Viewer>,
@@ -281,7 +312,10 @@ impl App {
         let repaint = ctx.clone();
         let wake: Wake = Arc::new(move || repaint.request_repaint());
         Self {
-            model: Model { browser: Browser::of(&options.scenes), ..Model::default() },
+            model: Model {
+                browser: Browser::of(&options.scenes).and_shipped(options.shipped_scenes.clone()),
+                ..Model::default()
+            },
             options,
             catalog: Arc::new(Catalog::standard()),
             workers: BTreeMap::new(),
@@ -293,6 +327,7 @@ impl App {
             pairs: Vec::new(),
             begun: BTreeSet::new(),
             asked_gain: None,
+            asked_preview: None,
             parts: Vec::new(),
             viewer: None,
             no_viewer: None,
@@ -328,6 +363,14 @@ impl App {
         form.policy = chosen.policy.unwrap_or(form.policy);
         form.budget = chosen.budget.unwrap_or(form.budget);
         form.seed = chosen.seed.unwrap_or(form.seed);
+        form.noise = chosen.noise.unwrap_or(form.noise);
+        if let Some(views) = &chosen.views {
+            form.views.clone_from(views);
+        }
+        match chosen.planner.onto(form.planner) {
+            Ok(planner) => form.planner = planner,
+            Err(error) => self.model.toasts.tell(Level::Error, error.to_string()),
+        }
         self.model.author.wake_with(self.wake.clone());
         if let Some(path) = self.options.open.clone() {
             if self.options.layout.is_none() && self.model.kept.layout == LayoutKind::Author {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::SystemTime;
 
-/// Where shipped scenes lie.
+/// Where scenes of one's own lie; in a checkout the shipped ones as well.
 pub const FOLDER: &str = "scenes";
 /// Width of a thumbnail, pixels.
 pub const THUMBNAIL_PX: u32 = 320;
@@ -74,7 +74,7 @@ impl Entry {
 }
 
 enum Job {
-    List { folder: PathBuf, recent: Vec<PathBuf> },
+    List { folder: PathBuf, shipped: Option<PathBuf>, recent: Vec<PathBuf> },
     Look(PathBuf),
     Count(PathBuf),
 }
@@ -89,6 +89,8 @@ enum Answer {
 pub struct Browser {
     /// The folder that is searched.
     folder: PathBuf,
+    /// The folder of the scenes that came with the program, which is searched as well.
+    shipped: Option<PathBuf>,
     /// What a person searches for.
     pub search: String,
     /// A path that a person types.
@@ -110,6 +112,7 @@ impl Browser {
     pub fn of(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
+            shipped: None,
             search: String::new(),
             typed: String::new(),
             entries: Vec::new(),
@@ -117,6 +120,11 @@ impl Browser {
             recent: Vec::new(),
             worker: None,
         }
+    }
+
+    /// And those below the folder that came with the program.
+    pub fn and_shipped(self, shipped: Option<PathBuf>) -> Self {
+        Self { shipped, ..self }
     }
 
     /// The folder that is searched.
@@ -141,8 +149,8 @@ impl Browser {
 
     /// Searches the folder again; files that have changed are looked at again.
     pub fn refresh(&mut self, wake: &Wake) {
-        let (folder, recent) = (self.folder.clone(), self.recent.clone());
-        self.ask(Job::List { folder, recent }, wake);
+        let (folder, shipped, recent) = (self.folder.clone(), self.shipped.clone(), self.recent.clone());
+        self.ask(Job::List { folder, shipped, recent }, wake);
     }
 
     /// Lists the scenes at the first call and when `recent` has changed, and takes in what was found since the last call.
@@ -233,7 +241,7 @@ fn start(wake: Wake) -> (Sender<Job>, Receiver<Answer>) {
 
 fn answer(job: Job, catalog: &Catalog, views: Option<&ViewArray>) -> Option<Answer> {
     match job {
-        Job::List { folder, recent } => Some(Answer::Listed(files(&folder, &recent))),
+        Job::List { folder, shipped, recent } => Some(Answer::Listed(files(&folder, shipped.as_deref(), &recent))),
         Job::Look(path) => {
             let look = look_at(&path, catalog).map_err(|error| error.to_string());
             Some(Answer::Looked(path, look))
@@ -253,13 +261,20 @@ fn look_at(path: &Path, catalog: &Catalog) -> nudge_core::Result<Box<Facts>> {
     Ok(Box::new(Facts { name, description, objects: objects.len(), hidden: None, picture }))
 }
 
-/// Scene files below a folder, by folder and name, and then the recent ones that lie elsewhere.
-fn files(folder: &Path, recent: &[PathBuf]) -> Vec<(PathBuf, String, Option<SystemTime>)> {
-    let mut found = Vec::new();
-    search(folder, 0, &mut found);
-    found.sort();
-    found.truncate(MOST);
-    let known: BTreeSet<PathBuf> = found.iter().filter_map(|path| path.canonicalize().ok()).collect();
+/// Scene files below a folder, by folder and name, then those that came with the program where that is another folder,
+/// and then the recent ones that lie elsewhere.
+fn files(folder: &Path, shipped: Option<&Path>, recent: &[PathBuf]) -> Vec<(PathBuf, String, Option<SystemTime>)> {
+    let below = |folder: &Path| {
+        let mut found = Vec::new();
+        search(folder, 0, &mut found);
+        found.sort();
+        found.truncate(MOST);
+        found
+    };
+    let is_same = |shipped: &Path| shipped.canonicalize().ok() == folder.canonicalize().ok();
+    let shipped = shipped.filter(|shipped| !is_same(shipped));
+    let (own, others) = (below(folder), shipped.map(below).unwrap_or_default());
+    let known: BTreeSet<PathBuf> = own.iter().chain(&others).filter_map(|path| path.canonicalize().ok()).collect();
     let changed = |path: &Path| path.metadata().and_then(|data| data.modified()).ok();
     let elsewhere = recent.iter().filter(|path| {
         FileKind::of(path) == FileKind::Scene
@@ -267,8 +282,13 @@ fn files(folder: &Path, recent: &[PathBuf]) -> Vec<(PathBuf, String, Option<Syst
             && path.canonicalize().is_ok_and(|path| !known.contains(&path))
     });
     let group = |path: &Path| path.parent().map_or(String::new(), |parent| parent.display().to_string());
-    let listed = found.iter().map(|path| (path.clone(), group(path), changed(path)));
-    listed.chain(elsewhere.map(|path| (path.clone(), "Recent".to_owned(), changed(path)))).collect()
+    let set = |path: &Path| {
+        let below = shipped.and_then(|shipped| path.parent()?.strip_prefix(shipped).ok());
+        format!("Shipped: {}", below.unwrap_or(Path::new("")).display())
+    };
+    let own = own.iter().map(|path| (path.clone(), group(path), changed(path)));
+    let others = others.iter().map(|path| (path.clone(), set(path), changed(path)));
+    own.chain(others).chain(elsewhere.map(|path| (path.clone(), "Recent".to_owned(), changed(path)))).collect()
 }
 
 fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
@@ -283,5 +303,32 @@ fn search(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
         } else if FileKind::of(&path) == FileKind::Scene && path.is_file() {
             found.push(path);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_of_ones_own_come_before_the_shipped_ones_and_none_comes_twice() {
+        let folder = tempfile::tempdir().expect("folder");
+        let at = |name: &str| folder.path().join(name);
+        for name in ["own/mine/a.toml", "share/scenes/high/b.toml", "share/scenes/high/notes.txt", "far/c.toml"] {
+            std::fs::create_dir_all(at(name).parent().expect("folder")).expect("made");
+            std::fs::write(at(name), "").expect("written");
+        }
+        let listed = |own: &Path, shipped: Option<&Path>| -> Vec<(PathBuf, String)> {
+            let recent = [at("share/scenes/high/b.toml"), at("far/c.toml")];
+            files(own, shipped, &recent).into_iter().map(|(path, group, _)| (path, group)).collect()
+        };
+        let mine = (at("own/mine/a.toml"), at("own/mine").display().to_string());
+        let shipped = (at("share/scenes/high/b.toml"), "Shipped: high".to_owned());
+        let far = (at("far/c.toml"), "Recent".to_owned());
+        assert_eq!(listed(&at("own"), Some(&at("share/scenes"))), [mine, shipped.clone(), far.clone()]);
+        assert_eq!(listed(&at("none"), Some(&at("share/scenes"))), [shipped.clone(), far.clone()]);
+        // In a checkout both are the same folder.
+        let here = (shipped.0, at("share/scenes/high").display().to_string());
+        assert_eq!(listed(&at("share/scenes"), Some(&at("own/../share/scenes"))), [here, far]);
     }
 }

@@ -42,6 +42,8 @@ pub enum Command {
     Pause,
     /// Stops a run without doing what it decides just now, or an opening.
     Cancel,
+    /// Stops the opening of one episode.
+    CancelOpening(SessionId),
     /// Stops an export or another task, by its position.
     CancelTask(usize),
     /// Starts an episode that shares the steps up to the cursor.

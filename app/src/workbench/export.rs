@@ -107,11 +107,15 @@ fn beside(path: &Path) -> Result<PathBuf> {
 
 /// `episode.json` as far as the session has come.
 fn record_of(session: &Session) -> EpisodeRecord {
-    if session.record.steps.len() == session.steps() {
-        return session.record.clone();
+    let mut record = session.record.clone();
+    if record.steps.len() != session.steps() {
+        let outcomes = session.moments.iter().filter_map(|moment| moment.outcome.as_ref());
+        record.steps = outcomes.map(|outcome| outcome.record.clone()).collect();
     }
-    let steps = session.moments.iter().filter_map(|moment| Some(moment.outcome.as_ref()?.record.clone()));
-    EpisodeRecord { steps: steps.collect(), ..session.record.clone() }
+    // Who would have gone on with it but has not is no maker of it.
+    let last = record.steps.len();
+    record.also_made_by.retain(|later| later.from_step <= last);
+    record
 }
 
 fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Watch<'_>) -> Result<()> {
@@ -166,5 +170,6 @@ fn summary(session: &Session, record: &EpisodeRecord) -> Result<picture::RgbImag
         catalog: &session.setup.catalog,
         start: &session.moment(0).bodies,
         moments: &columns,
+        beside: None,
     })
 }

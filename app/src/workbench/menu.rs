@@ -112,9 +112,9 @@ impl M {
     /// What it does, in a sentence.
     pub fn tooltip(self) -> &'static str {
         match self {
-            M::Scenes => "Show the scenes, to start an episode of one",
+            M::Scenes => "Show the scenes, to start an episode of one of them",
             M::OpenScene => "Choose a scene file (.toml) to start an episode of; in the editor, to edit",
-            M::OpenEpisode => "Choose an episode's directory, or a recording (.rrd), to look at or go on with",
+            M::OpenEpisode => "Choose an episode's directory, to look at or to resume",
             M::Save => "Write notes and verdicts beside the episode, or the scene that is being authored",
             M::SaveSceneAs => "Write the scene that is being authored to another file",
             M::ExportEpisode => "Write the episode with its notes as one directory and one self-contained recording",
@@ -126,21 +126,21 @@ impl M {
             M::Redo => "Make the change again",
             M::Duplicate => "Put a copy of the chosen object beside it",
             M::Delete => "Take the chosen object away",
-            M::StepBack => "Show the state one action earlier",
-            M::StepForward => "Show the state one action later",
+            M::StepBack => "Show the state one action earlier (also ←)",
+            M::StepForward => "Show the state one action later (also →)",
             M::First => "Show the state before the first action",
             M::Last => "Show the latest state",
             M::Decide => "Ask the policy what it would do next, and show what it weighed",
             M::DoIt => "Do what was decided; decides first if nothing was",
             M::Run => "Decide and act until the budget is used up",
             M::RunBoth => "Run both episodes of the comparison until their budgets are used up",
-            M::Pause => "Stop after the action that is under way; Run goes on",
+            M::Pause => "Stop after the action that is under way; Run resumes",
             M::Cancel => "Stop now: what is being decided is not done, an action under way is finished",
             M::Branch => "Start an episode that shares the actions up to the cursor; both stay open",
             M::EditScene => "Open a copy of this episode's scene in Author",
             M::Layout(LayoutKind::Episode) => "Belief, floor maps, score curves and the decision",
             M::Layout(LayoutKind::Why) => "The numbers, history and causes of one voxel or floor cell",
-            M::Layout(LayoutKind::Gains) => "What every view would tell, in nats",
+            M::Layout(LayoutKind::Gains) => "The gain of every view, in nats",
             M::Layout(LayoutKind::Push) => "What a push would do, and what it did",
             M::Layout(LayoutKind::Compare) => "Two episodes on one clock",
             M::Layout(LayoutKind::Author) => "Make a scene",
@@ -197,14 +197,14 @@ impl M {
         }
     }
 
-    /// Whether it can be done now.
+    /// Whether it can be done now: what is about an episode, only while one is in sight.
     pub fn is_available(self, model: &Model) -> bool {
-        let session = model.session();
+        let session = model.session().filter(|_| model.shows_episode());
         let idle = session.is_some_and(|session| session.activity == Activity::Idle);
         let open = session.is_some_and(Session::is_open);
         let authoring = model.kept.layout == LayoutKind::Author;
         match self {
-            M::Save => authoring || session.is_some_and(|session| session.unsaved),
+            M::Save => authoring || model.session().is_some_and(|session| session.unsaved),
             M::SaveSceneAs | M::Undo | M::Redo | M::Duplicate | M::Delete => authoring,
             M::ExportEpisode | M::ExportTables | M::CloseEpisode => session.is_some(),
             M::StepBack | M::First => session.is_some() && model.cursor > 0,
@@ -212,11 +212,13 @@ impl M {
             M::Decide | M::DoIt | M::Run => idle && open,
             M::RunBoth => {
                 let can_run = |session: &Session| session.activity == Activity::Idle && session.is_open();
-                model.other_session().is_some_and(|other| can_run(other) || (idle && open))
+                let other = model.other_session().filter(|_| session.is_some());
+                other.is_some_and(|other| can_run(other) || (idle && open))
             }
-            M::Pause => model.runs_any(|session| session.activity == Activity::Running),
-            M::Cancel => model.runs_any(|session| session.activity != Activity::Idle),
-            M::Branch | M::EditScene => session.is_some(),
+            M::Pause => session.is_some() && model.runs_any(|session| session.activity == Activity::Running),
+            M::Cancel => session.is_some() && model.runs_any(|session| session.activity != Activity::Idle),
+            M::Branch => session.is_some(),
+            M::EditScene => model.session().is_some(),
             _ => true,
         }
     }
@@ -225,6 +227,7 @@ impl M {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::workbench::fixture;
     use std::collections::BTreeSet;
 
     #[test]
@@ -244,5 +247,22 @@ mod tests {
             assert!(!entry.is_available(&model), "{entry:?}");
         }
         assert!(M::OpenScene.is_available(&model) && M::Quit.is_available(&model));
+    }
+
+    #[test]
+    fn an_episode_that_is_out_of_sight_takes_no_orders() {
+        let mut model = fixture::model();
+        model.cursor = 3;
+        let about_it = [M::Decide, M::DoIt, M::Run, M::Branch, M::CloseEpisode, M::StepBack, M::StepForward, M::First];
+        let available = |model: &Model| about_it.into_iter().filter(|entry| entry.is_available(model)).count();
+        assert_eq!(available(&model), about_it.len());
+        model.browsing = true;
+        assert_eq!(available(&model), 0, "behind the scenes to choose from");
+        model.browsing = false;
+        model.recording = Some("a.rrd".into());
+        assert_eq!(available(&model), 0, "behind a recording");
+        model.recording = None;
+        model.kept.layout = LayoutKind::Author;
+        assert_eq!(available(&model), 0, "behind the editor");
     }
 }

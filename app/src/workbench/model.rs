@@ -7,10 +7,11 @@ use super::derive::Derived;
 use super::panels;
 use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
+use crate::driver::default_belief;
 use nudge_core::arm::Push;
 use nudge_core::belief::PushPrediction;
-use nudge_core::camera::ViewId;
-use nudge_core::plan::{PlannerSettings, PolicyKind};
+use nudge_core::camera::{NoiseModel, ViewId};
+use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -155,6 +156,10 @@ pub struct StartForm {
     pub seed: u64,
     /// Number of actions.
     pub budget: usize,
+    /// The view array: the name of one that comes with the program, or a file.
+    pub views: String,
+    /// What the camera gets wrong.
+    pub noise: Option<NoiseModel>,
     /// The planner's numbers.
     pub planner: PlannerSettings,
     /// A second policy to run side by side with the first.
@@ -163,15 +168,27 @@ pub struct StartForm {
 
 impl Default for StartForm {
     fn default() -> Self {
+        let policy = PolicyKind::Mem;
+        let belief = default_belief(policy);
         Self {
             scene: None,
-            policy: PolicyKind::Mem,
-            belief: "classical".to_owned(),
+            policy,
+            belief: belief.to_owned(),
             seed: 0,
             budget: 20,
-            planner: PlannerSettings::default(),
+            views: "standard300".to_owned(),
+            noise: None,
+            planner: PlannerSettings::of_belief(belief),
             against: None,
         }
+    }
+}
+
+impl StartForm {
+    /// With another belief update, and the way to count gains that goes with it.
+    pub fn with_belief(self, belief: &str) -> Self {
+        let planner = self.planner.counting(Counted::of_belief(belief));
+        Self { belief: belief.to_owned(), planner, ..self }
     }
 }
 
@@ -293,7 +310,15 @@ impl Model {
             self.hovered = Hovered::Nothing;
         }
         self.shown = Some(id);
-        self.cursor = self.session().map_or(0, Session::steps);
+        self.go_to(self.session().map_or(0, Session::steps));
+    }
+
+    /// Moves the cursor. A push was chosen among those of one decision: at another step it is let go.
+    pub fn go_to(&mut self, step: usize) {
+        if step != self.cursor {
+            self.candidate = None;
+        }
+        self.cursor = step;
     }
 
     /// Lets an open episode go, with all that was made of it.
@@ -336,6 +361,13 @@ impl Model {
         self.on_show().any(is)
     }
 
+    /// Whether an episode is in sight: open, and neither the scenes to choose from, nor the editor, nor a foreign recording
+    /// are in its place.
+    pub fn shows_episode(&self) -> bool {
+        let hidden = self.browsing || self.recording.is_some() || self.kept.layout == LayoutKind::Author;
+        self.session().is_some() && !hidden
+    }
+
     /// The state at the cursor.
     pub fn moment(&self) -> Option<&Arc<Moment>> {
         Some(self.session()?.moment(self.cursor))
@@ -350,5 +382,22 @@ impl Model {
     /// The same for an episode and a step.
     pub fn derived_of(&self, id: SessionId, step: usize) -> Option<&Arc<Derived>> {
         self.derived.get(&(id, step))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nudge_core::belief::{CLASSICAL, CNABU};
+
+    #[test]
+    fn a_new_episode_begins_with_the_networks_where_they_are_and_with_the_gain_that_goes_with_them() {
+        let form = StartForm::default();
+        let here = nudge_core::cnabu::AVAILABLE && nudge_core::cnabu::models_dir().is_some();
+        assert_eq!(form.belief, if here { CNABU } else { CLASSICAL });
+        assert_eq!(form.planner.counted, if here { Counted::Unseen } else { Counted::All });
+        assert_eq!(form.planner, PlannerSettings::of_belief(&form.belief));
+        let classical = form.with_belief(CLASSICAL);
+        assert_eq!((classical.belief.as_str(), classical.planner), (CLASSICAL, PlannerSettings::default()));
     }
 }

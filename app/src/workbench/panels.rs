@@ -32,7 +32,7 @@ mod push_review;
 mod spark;
 mod table;
 mod textures;
-mod weighed;
+pub(super) mod weighed;
 mod words;
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::annotations::Annotations;
 use super::half_belief::HalfBelief;
+use crate::driver::default_out;
 use nudge_core::arm::ArmTool;
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, ViewId};
@@ -11,12 +12,41 @@ use nudge_core::plan::Decision;
 use nudge_core::scene::{Body, Catalog};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// An open episode, by the order of opening; never used twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SessionId(pub u32);
+
+/// What stands between a branch's step and the name of the episode that it comes from.
+const BRANCHED: &str = "-from-step-";
+
+/// What a branch's directory has behind the name of the episode.
+pub fn branch_suffix(step: usize) -> String {
+    format!("{BRANCHED}{step}")
+}
+
+/// What stands behind an episode's own name in that of its directory, in words: `-from-step-6-2` is `from step 6 (2)`; `None`
+/// for what this program does not put there.
+fn words_of_suffix(suffix: &str) -> Option<String> {
+    let Some(branch) = suffix.strip_prefix(BRANCHED) else { return again(suffix) };
+    let (step, rest) = branch.split_at(branch.find('-').unwrap_or(branch.len()));
+    match (is_number(step), rest) {
+        (true, "") => Some(format!("from step {step}")),
+        (true, rest) => Some(format!("from step {step} {}", again(rest)?)),
+        (false, _) => None,
+    }
+}
+
+/// `(2)` of `-2`.
+fn again(suffix: &str) -> Option<String> {
+    suffix.strip_prefix('-').filter(|number| is_number(number)).map(|number| format!("({number})"))
+}
+
+fn is_number(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
+}
 
 /// The state after a number of actions, and the step that led to it.
 #[derive(Clone, Debug)]
@@ -108,9 +138,15 @@ pub struct Session {
 }
 
 impl Session {
-    /// `tunnel, mem, seed 3`.
+    /// `tunnel, mem, seed 3`; of a branch, and of one that was started again, with what its directory is named behind that:
+    /// `tunnel, mem, seed 3 from step 6`, `tunnel, mem, seed 3 (2)`.
     pub fn title(&self) -> String {
-        format!("{}, {}, seed {}", self.record.scene.name, self.record.config.policy, self.record.config.seed)
+        let (scene, config) = (&self.record.scene, &self.record.config);
+        let plain = format!("{}, {}, seed {}", scene.name, config.policy, config.seed);
+        let own = default_out(scene, config.policy, config.seed);
+        let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let behind = name(&self.path).strip_prefix(&name(&own)).and_then(words_of_suffix);
+        behind.map_or_else(|| plain.clone(), |behind| format!("{plain} {behind}"))
     }
 
     /// Number of actions done.
@@ -139,6 +175,30 @@ impl Session {
         match self.moments.get(step + 1) {
             Some(next) => next.decision(),
             None => self.pending.as_deref(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workbench::fixture;
+
+    #[test]
+    fn an_episode_its_branch_and_one_started_again_have_different_names() {
+        let mut session = fixture::session(1);
+        let own = default_out(&session.record.scene, session.record.config.policy, session.record.config.seed);
+        let mut title = |behind: &str| {
+            session.path = PathBuf::from(format!("{}{behind}", own.display()));
+            session.title()
+        };
+        let plain = title("");
+        assert_eq!(plain, "small shelf, mem, seed 1");
+        assert_eq!(title(&branch_suffix(6)), format!("{plain} from step 6"));
+        assert_eq!(title("-from-step-6-2"), format!("{plain} from step 6 (2)"));
+        assert_eq!(title("-3"), format!("{plain} (3)"));
+        for other in ["-of-mine", "-from-step-", "-from-step-x", "-from-step-6-x", "2"] {
+            assert_eq!(title(other), plain, "{other}");
         }
     }
 }

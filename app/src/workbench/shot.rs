@@ -3,8 +3,10 @@
 use super::app::{App, Options};
 use super::command::Command;
 use super::model::{LayoutKind, Picked};
+use super::session::Session;
 use egui_kittest::Harness;
 use image::RgbImage;
+use nudge_core::belief::{Belief, beta_mean};
 use nudge_core::plan::Action;
 use nudge_core::{Error, Result};
 use re_viewer::external::egui;
@@ -142,12 +144,39 @@ fn choose(app: &mut App, step: Option<usize>, layout: LayoutKind) {
     }
 }
 
+/// The voxel with most to tell: one that a look and a push both changed, by the lesser of the two changes of its probability.
+/// `None` where no push changed a voxel that looks had told of.
+fn most_telling(session: &Session) -> Option<usize> {
+    let mut before: Option<Belief> = None;
+    // The largest change by a look, and by a push.
+    let mut changes: Vec<[f32; 2]> = Vec::new();
+    for moment in &session.moments {
+        let belief = moment.belief.belief();
+        if let (Some(before), Some(outcome)) = (&before, &moment.outcome) {
+            let by = usize::from(matches!(outcome.record.action, Action::Push(_)));
+            let pairs = before.occupancy.iter().zip(&belief.occupancy);
+            for (change, (a, b)) in changes.iter_mut().zip(pairs) {
+                change[by] = change[by].max((beta_mean(*a) - beta_mean(*b)).abs());
+            }
+        } else {
+            changes = vec![[0.0; 2]; belief.occupancy.len()];
+        }
+        before = Some(belief);
+    }
+    let lesser = |voxel: &usize| changes[*voxel][0].min(changes[*voxel][1]);
+    let most = (0..changes.len()).max_by(|a, b| lesser(a).total_cmp(&lesser(b)))?;
+    (lesser(&most) > 0.1).then_some(most)
+}
+
 /// Asks what the layout is there to answer.
 fn explain(app: &mut App, layout: LayoutKind) {
     let Some(session) = app.model.session() else { return };
     let decision = session.decision_after(app.model.cursor).or_else(|| session.moment(app.model.cursor).decision());
     match layout {
         LayoutKind::Why => {
+            if let Some(voxel) = most_telling(session) {
+                return app.ask(Command::Pick(Some(Picked::Voxel(voxel))));
+            }
             let entropy = app.model.derived().map(|derived| crate::picture::cell_entropy(&derived.belief));
             let most =
                 entropy.and_then(|entropy| (0..entropy.len()).max_by(|&a, &b| entropy[a].total_cmp(&entropy[b])));
@@ -158,13 +187,7 @@ fn explain(app: &mut App, layout: LayoutKind) {
                 app.ask(Command::GainOf(view));
             }
         }
-        LayoutKind::Push => {
-            let best = decision.and_then(|decision| Some((decision.best_push?, decision)));
-            if let Some((at, push)) = best.and_then(|(at, decision)| Some((at, decision.candidates.get(at)?.push))) {
-                app.model.candidate = Some(at);
-                app.ask(Command::Preview(push));
-            }
-        }
-        LayoutKind::Episode | LayoutKind::Compare | LayoutKind::Author => {}
+        // The layout of pushes chooses one by itself.
+        LayoutKind::Episode | LayoutKind::Push | LayoutKind::Compare | LayoutKind::Author => {}
     }
 }

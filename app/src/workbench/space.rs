@@ -5,27 +5,28 @@
 //! last one, and remembers which voxel every drawn instance is, for picking.
 
 mod arm;
+mod push;
+mod voxels;
 
 use super::half_belief::HalfBelief;
 use super::model::{ColourBy, Display, GainSource, Hovered, LayoutKind, Picked, Preview};
-use super::session::{Moment, SessionId, Setup};
+use super::session::{Moment, Session, SessionId, Setup};
 use super::{space_layout, viewer};
 use crate::colors::{self, Colormap, Rgb};
-use crate::picture;
 use crate::record::layout::Ground;
 use crate::record::shapes;
-use crate::record::voxels::{colored, surface};
+use crate::record::voxels::colored;
 use nudge_core::Pose;
-use nudge_core::belief::{Belief, bernoulli_entropy};
+use nudge_core::belief::Belief;
 use nudge_core::camera::ViewId;
-use nudge_core::grid::{Cell, Grid};
+use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, Decision};
-use nudge_core::scene::{BACKGROUND, Body, Catalog, ClassId, Shelf};
+use nudge_core::scene::{Body, Catalog, Shelf};
 use nudge_core::solid::ConvexPart;
-use nudge_core::world::TruthMap;
 use rerun::{AsComponents, RecordingStream};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
+use voxels::{Voxels, voxel_key};
 
 /// Entities of the window's recording.
 pub mod at {
@@ -53,6 +54,8 @@ pub mod at {
     pub const DIFFERENCE: &str = "push/difference";
     /// What it really left.
     pub const HAPPENED: &str = "push/happened";
+    /// Why there is nothing of it to show.
+    pub const HAPPENED_NOTE: &str = "push/happened/note";
     /// The arm.
     pub const ARM: &str = "robot/arm";
     /// The way of its tip.
@@ -93,9 +96,27 @@ pub struct Side {
     pub after: Option<Arc<Moment>>,
     /// What was decided at the cursor, or is pending.
     pub decision: Option<Arc<Decision>>,
+    /// The weight of the disturbance term in the episode's decisions.
+    pub gamma: f32,
 }
 
 impl Side {
+    /// An episode's state after `step` actions, or its last one.
+    pub fn of(session: &Session, step: usize) -> Self {
+        let moment = session.moment(step).clone();
+        let step = moment.step;
+        Self {
+            id: session.id,
+            shelf: session.record.scene.shelf,
+            setup: session.setup.clone(),
+            before: step.checked_sub(1).map(|before| session.moment(before).clone()),
+            after: session.moments.get(step + 1).cloned(),
+            decision: session.decision_after(step).cloned().map(Arc::new),
+            gamma: session.record.config.planner.gamma,
+            moment,
+        }
+    }
+
     fn key(&self) -> (SessionId, usize) {
         (self.id, self.moment.step)
     }
@@ -247,8 +268,9 @@ impl Painter {
             self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
         }
         for entity in [at::CANDIDATES, at::CHOSEN] {
-            self.log(entity, &no_arrows());
+            self.log(entity, &push::no_arrows());
         }
+        self.log(at::HAPPENED_NOTE, &rerun::Points3D::new(Vec::<[f32; 3]>::new()));
         for entity in [at::SHELF, at::OBJECTS, at::OTHER_OBJECTS, at::ARM] {
             self.log(entity, &nothing());
         }
@@ -327,98 +349,6 @@ impl Painter {
         }
     }
 
-    fn pushes(&mut self, side: &Side, space: &Space) {
-        let shown = space.display.pushes || space.layout == LayoutKind::Push;
-        let decision = side.decision.as_ref().filter(|decision| shown && !decision.candidates.is_empty());
-        if self.differs(at::CANDIDATES, format!("{:?} {}", side.key(), decision.is_some())) {
-            match decision {
-                Some(decision) => {
-                    self.log(at::CANDIDATES, &shapes::candidates(decision, nudge_core::plan::GAMMA));
-                }
-                None => self.log(at::CANDIDATES, &no_arrows()),
-            }
-        }
-        // The push that led here, or the one that is chosen to be looked at.
-        let done = match side.moment.outcome.as_ref().map(|outcome| outcome.record.action) {
-            Some(Action::Push(push)) => Some(push),
-            _ => None,
-        };
-        let chosen = space
-            .candidate
-            .filter(|_| space.layout == LayoutKind::Push)
-            .and_then(|at| side.decision.as_ref()?.candidates.get(at))
-            .map(|candidate| candidate.push)
-            .or(done);
-        if self.differs(at::CHOSEN, format!("{:?} {chosen:?}", side.id)) {
-            match chosen {
-                Some(push) => self.log(at::CHOSEN, &shapes::chosen_push(&push)),
-                None => self.log(at::CHOSEN, &no_arrows()),
-            }
-        }
-    }
-
-    /// Beside what is believed now: predicted, the difference, and what happened. Of the push that is looked at, else of the
-    /// one that led here.
-    fn push_views(&mut self, side: &Side, space: &Space) {
-        let asked = space.preview.as_ref().filter(|preview| preview.of == side.key());
-        let led_here = side.moment.outcome.as_deref().filter(|outcome| asked.is_none() && outcome.prediction.is_some());
-        let now = self.full(side.key(), &side.moment.belief);
-        let grid = now.grid;
-        if self.differs(at::PREDICTED, format!("{:?} {:?}", side.key(), asked.map(|preview| preview.push))) {
-            let swept = asked.map(|preview| &*preview.swept);
-            let swept = swept.or_else(|| led_here.and_then(|outcome| outcome.swept.as_ref()).map(|swept| &swept.swept));
-            let swept = swept.map_or_else(Vec::new, |swept| {
-                let mut inside = vec![false; grid.voxel_count()];
-                swept.iter().for_each(|index| inside[index] = true);
-                surface(&grid, &inside)
-            });
-            self.log(at::SWEPT, &colored(&grid, &swept, |_| [120, 200, 255]).with_opacity(0.25));
-            let beliefs = match (asked, &side.before) {
-                (Some(preview), _) => {
-                    let mut after = (*now).clone();
-                    after.apply(&preview.prediction);
-                    Some((now.clone(), Arc::new(after)))
-                }
-                (None, Some(before)) if led_here.is_some() => {
-                    Some((self.full((side.id, before.step), &before.belief), now.clone()))
-                }
-                _ => None,
-            };
-            match beliefs {
-                None => {
-                    self.log_voxels(at::PREDICTED, &grid, Vec::new(), |_| [0; 3]);
-                    self.log_voxels(at::DIFFERENCE, &grid, Vec::new(), |_| [0; 3]);
-                }
-                Some((before, after)) => {
-                    let truth = &side.moment.truth;
-                    let plain = Display::default();
-                    let (voxels, rgb) =
-                        Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
-                    self.log_voxels(at::PREDICTED, &grid, voxels, rgb);
-                    let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..plain };
-                    let (voxels, rgb) =
-                        Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&changed, Some(&before));
-                    self.log_voxels(at::DIFFERENCE, &grid, voxels, rgb);
-                }
-            }
-        }
-        let pushed = |moment: &&Arc<Moment>| {
-            let action = moment.outcome.as_ref().map(|outcome| outcome.record.action);
-            matches!(action, Some(Action::Push(_)))
-        };
-        let here = Some(&side.moment).filter(|_| asked.is_none());
-        let pushed = side.after.as_ref().filter(pushed).or_else(|| here.filter(pushed));
-        if self.differs(at::HAPPENED, format!("{:?} {:?}", side.key(), pushed.map(|moment| moment.step))) {
-            let truth = pushed.map_or(&side.moment.truth, |pushed| &pushed.truth);
-            let inside: Vec<bool> = truth.occupancy.iter().map(|o| *o == 1).collect();
-            let voxels = if pushed.is_some() { surface(&grid, &inside) } else { Vec::new() };
-            let catalog = &side.setup.catalog;
-            self.log_voxels(at::HAPPENED, &grid, voxels, |index| {
-                colors::of_class(catalog, ClassId(truth.labels[index / grid.dims[2]]))
-            });
-        }
-    }
-
     fn gain(&mut self, side: &Side, space: &Space) {
         let source = space.gain.as_ref().filter(|source| source.of == side.key());
         if !self.differs(at::GAIN, format!("{:?} {:?}", side.key(), source.map(|source| source.view))) {
@@ -486,80 +416,10 @@ impl Painter {
     }
 }
 
-/// What of the display decides about the belief's voxels.
-fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [[f32; 2]; 3]) {
-    (display.colour_by, display.band, display.slice_m)
-}
-
 /// Every second, third ... voxel, if there are too many.
 fn thinned(voxels: Vec<usize>) -> Vec<usize> {
     let step = voxels.len().div_ceil(MOST_VOXELS).max(1);
     if step == 1 { voxels } else { voxels.into_iter().step_by(step).collect() }
-}
-
-/// A belief with what colours need.
-struct Voxels<'a> {
-    belief: &'a Belief,
-    truth: &'a TruthMap,
-    catalog: &'a Catalog,
-}
-
-impl<'a> Voxels<'a> {
-    /// The voxels to draw and their colours. Without a state before, nothing has changed.
-    fn drawn(&self, display: &Display, before: Option<&'a Belief>) -> (Vec<usize>, Box<dyn Fn(usize) -> Rgb + 'a>) {
-        let (belief, truth, catalog) = (self.belief, self.truth, self.catalog);
-        let grid = &belief.grid;
-        let height = grid.dims[2];
-        let [least, most] = display.band;
-        // Per axis, which numbers of voxels have their centre in the slice; a slice thinner than a voxel has one.
-        let slices: [[usize; 2]; 3] = std::array::from_fn(|axis| {
-            let at = |m: f32| ((m - grid.origin[axis]) / grid.voxel_m).clamp(0.0, grid.dims[axis] as f32);
-            let [low, high] = display.slice_m[axis].map(at);
-            let first = ((low - 0.5).ceil().max(0.0) as usize).min(grid.dims[axis] - 1);
-            [first, ((high - 0.5).floor().max(first as f32) as usize).min(grid.dims[axis] - 1)]
-        });
-        let in_band = |p: f32| p >= least && p <= most && (p > 0.5 || least < 0.5);
-        let changed = |index: usize| before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
-        let shows = |index: usize| match display.colour_by {
-            ColourBy::Change => changed(index).abs() >= CHANGED,
-            ColourBy::Error => belief.probability(index) > 0.5 || truth.occupancy[index] == 1,
-            _ => in_band(belief.probability(index)),
-        };
-        let mut voxels = vec![false; grid.voxel_count()];
-        let [along_x, along_y, along_z] = slices.map(|[first, last]| first..=last);
-        for x in along_x {
-            for y in along_y.clone() {
-                let column = grid.column(grid.cell_index(Cell { x: x as u16, y: y as u16 })).start;
-                let levels = column + along_z.start()..column + along_z.end() + 1;
-                for (voxel, index) in voxels[levels.clone()].iter_mut().zip(levels) {
-                    *voxel = shows(index);
-                }
-            }
-        }
-        let shown = surface(grid, &voxels);
-        let rgb: Box<dyn Fn(usize) -> Rgb + 'a> = match display.colour_by {
-            ColourBy::Probability => Box::new(move |index| Colormap::Viridis.rgb(belief.probability(index))),
-            ColourBy::Entropy => Box::new(move |index| {
-                Colormap::Magma.of(bernoulli_entropy(belief.probability(index)), [0.0, std::f32::consts::LN_2])
-            }),
-            ColourBy::Class => Box::new(move |index| match picture::believed_class(belief, index / height) {
-                None | Some(BACKGROUND) => colors::UNKNOWN_RGB,
-                Some(class) => colors::of_class(catalog, class),
-            }),
-            ColourBy::Error => {
-                Box::new(move |index| match (belief.probability(index) > 0.5, truth.occupancy[index] == 1) {
-                    (true, false) => colors::HALLUCINATED_RGB,
-                    (false, true) => colors::MISSED_RGB,
-                    _ => [226, 228, 232],
-                })
-            }
-            ColourBy::Change => Box::new(move |index| {
-                let change = before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
-                Colormap::Diverging.of(change, [-1.0, 1.0])
-            }),
-        };
-        (shown, rgb)
-    }
 }
 
 fn glass(bodies: &[Body], catalog: &Catalog) -> rerun::Mesh3D {
@@ -609,10 +469,6 @@ fn nothing() -> rerun::Mesh3D {
         .with_vertex_normals([[0.0, 0.0, 1.0]; 3])
         .with_triangle_indices([[0, 1, 2]])
         .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(0, 0, 0, 0))
-}
-
-fn no_arrows() -> rerun::Arrows3D {
-    rerun::Arrows3D::from_vectors(Vec::<[f32; 3]>::new())
 }
 
 /// A view's frustum, or nothing.

@@ -71,7 +71,7 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -
                 1.0,
                 Part::Row(vec![
                     (1.0, view("Difference", &[at::DIFFERENCE, at::CHOSEN, at::PICKED])),
-                    (1.0, view("What happened", &[at::HAPPENED, at::CHOSEN])),
+                    (1.0, view("What happened", &[at::HAPPENED, at::HAPPENED_NOTE, at::CHOSEN])),
                 ]),
             ),
         ]),

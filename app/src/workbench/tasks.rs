@@ -72,7 +72,7 @@ impl Tasks {
                 !own.cancelled.load(Ordering::Relaxed)
             };
             let outcome = catch_unwind(AssertUnwindSafe(|| work(&watch)))
-                .unwrap_or_else(|panic| (Level::Error, format!("{what} broke down: {}", words_of(&*panic))));
+                .unwrap_or_else(|panic| (Level::Error, format!("{what} failed: {}", words_of(&*panic))));
             wake();
             outcome
         })?;
@@ -151,7 +151,7 @@ mod tests {
         tasks.start("Other", wake(), |_| (Level::Info, "done".to_owned())).expect("a thread");
         let mut said = end(&mut tasks);
         said.sort_by(|a, b| a.1.cmp(&b.1));
-        assert_eq!(said[0].1, "Exporting to x broke down: a bad disk");
+        assert_eq!(said[0].1, "Exporting to x failed: a bad disk");
         assert_eq!(said[1].1, "done");
     }
 }

@@ -6,11 +6,9 @@
 
 mod linked;
 
-use rerun::external::re_sdk_types::blueprint::components::PanelState;
-use re_viewer::external::re_ui::{
-    RecordingCommand, RecordingCommandKind, RecordingCommandSender as _,
-};
+use re_viewer::external::re_ui::{RecordingCommand, RecordingCommandKind, RecordingCommandSender as _};
 use re_viewer::external::{eframe, egui, re_log_channel, re_log_types, tokio};
+use rerun::external::re_sdk_types::blueprint::components::PanelState;
 use rerun::grpc_server::GrpcServerSink;
 use rerun::sink::LogSink as _;
 use rerun::{RecordingStream, RecordingStreamBuilder};

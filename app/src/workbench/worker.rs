@@ -216,7 +216,7 @@ fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Pos
     post.send(Event::Activity(Activity::Idle));
     while let Ok(order) = inbox.recv() {
         let Track::Writing(driver) = &mut track else {
-            post.send(Event::Failed("this episode can only be looked at; branch from it to go on".to_owned()));
+            post.send(Event::Failed("this episode is read only; branch from it to continue".to_owned()));
             continue;
         };
         let done = match order {
@@ -282,7 +282,7 @@ fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Momen
 }
 
 fn update_named(name: &str, config: &EpisodeConfig) -> Result<Arc<dyn BeliefUpdate>> {
-    Ok(crate::driver::belief_update(Some(name), config.policy)?.0)
+    crate::driver::belief_update(Some(name), config.policy)
 }
 
 fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Result<(Track, Opened)> {
@@ -316,13 +316,18 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
                 let (episode, difference) = review(&path, catalog.clone(), update.clone(), &mut watch)?;
                 drop(watch);
                 let reason = difference.map_or(why, |difference| {
-                    format!("its actions lead elsewhere when repeated here ({difference}); shown is what it holds")
+                    format!("repeating its actions gives another result here ({difference}); shown is what it holds")
                 });
                 Ok((Track::Reading, opened(&path, &episode, update, moments, Some(reason))?))
             };
-            let update = match update_of(&record.config.belief)? {
-                Ok(update) => update,
-                Err(why) => return look(None, format!("{why}; {HELD}")),
+            // Networks that are not here, cannot be read, or have other weights than those that made it.
+            let update = match update_of(&record.config.belief) {
+                Ok(Ok(update)) => match record.other_weights(&*update) {
+                    None => update,
+                    Some(words) => return look(None, format!("{words}; {HELD}")),
+                },
+                Ok(Err(why)) => return look(None, format!("{why}; {HELD}")),
+                Err(error) => return look(None, format!("{error}; {HELD}")),
             };
             if look_only {
                 return look(Some(update), "nothing in its directory shall change".to_owned());

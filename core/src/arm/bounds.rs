@@ -1,4 +1,4 @@
-//! What follows from an arm's links once: how far each joint moves things, and which links may meet.
+//! Quantities that are computed once for an arm: how far each joint can move a point, and which links can collide.
 
 use super::model::{Arm, JointKind, Part};
 use super::{BodyPoses, Joints};

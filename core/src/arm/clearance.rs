@@ -1,4 +1,4 @@
-//! How much room an arm has in a configuration, and what is in its way.
+//! The clearance of an arm in a configuration, and the nearest obstacle.
 
 use super::model::{Part, Role};
 use super::space::{Gripper, MAP_MARGIN_M, MapObstacles, PANELS, SHELF_MARGIN_M, Space};
@@ -6,13 +6,13 @@ use super::{Ball, BodyPoses, Frame, Joints};
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Room beyond this is not told apart, metres.
+/// Clearance above this is not distinguished, metres.
 const PLENTY_M: f64 = 0.06;
 /// The balls of two links stick out of them by about this much together, metres, which the arm's own links need not keep
 /// from each other.
 const OVERSHOOT_M: f64 = 0.010;
 
-/// What an arm meets.
+/// What an arm collides with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "with", rename_all = "snake_case")]
 pub enum Obstacle {
@@ -23,7 +23,8 @@ pub enum Obstacle {
     },
     /// A panel of the shelf.
     Shelf {
-        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`, or `inside` where nothing of it may be entered.
+        /// Which: `board`, `back`, `left wall`, `right wall`, `ceiling`, or `inside` where the whole interior is
+        /// forbidden.
         panel: String,
     },
     /// The table that the arm stands on.
@@ -36,12 +37,12 @@ pub enum Obstacle {
     },
 }
 
-/// A part of the arm that has too little room.
+/// A part of the arm that has too little clearance.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hit {
     /// The link.
     pub link: String,
-    /// What it meets.
+    /// The obstacle.
     #[serde(flatten)]
     pub obstacle: Obstacle,
 }
@@ -93,8 +94,8 @@ impl Placed {
 }
 
 impl Space<'_> {
-    /// How far every point of the arm may at least move before anything is touched or a margin is broken, metres, at
-    /// most 6 cm. Zero or less where the arm may not be.
+    /// The clearance of the arm: every point may move this far before it touches anything or violates a margin, metres,
+    /// at most 6 cm. Zero or less in a forbidden configuration.
     pub fn room_m(&self, joints: &Joints) -> f64 {
         self.measure(joints, PLENTY_M, |_, _| ())
     }
@@ -119,7 +120,8 @@ impl Space<'_> {
         Some(Hit { link: name(part), obstacle })
     }
 
-    /// The least room of any part, starting from `room`; `closer` hears of every part that has less than all before.
+    /// The smallest clearance of any part, starting from `room`; `closer` is called for every part that has less than
+    /// all before.
     fn measure(&self, joints: &Joints, mut room: f64, mut closer: impl FnMut(usize, Met)) -> f64 {
         let poses = self.arm.body_poses(joints);
         for part in 0..self.arm.places.len() {
@@ -132,8 +134,8 @@ impl Space<'_> {
         room
     }
 
-    /// How far a part (by position in [`super::Arm::parts`]) may move before it meets shelf, table or map, metres, at most
-    /// `least`; `closer` hears of everything that has less than all before.
+    /// How far a part (by position in [`super::Arm::parts`]) may move before it meets shelf, table or map, metres, at
+    /// most `least`; `closer` is called for everything that has less than all before.
     pub(super) fn part_room(
         &self,
         part: usize,

@@ -7,7 +7,8 @@ use crate::solid::{Bounds, ConvexPart};
 const OVERSHOOT_M: f32 = 0.004;
 /// How far balls may stick out of a flat end, metres.
 const END_OVERSHOOT_M: f32 = 0.010;
-/// Edge of the cells that cover what is no rod, metres: half of what is thin, within these bounds.
+/// Smallest and largest edge of the cells that cover a part that is not a rod, metres; between them it is half of the
+/// part's thickness.
 const CELL_M: [f32; 2] = [0.0175, 0.03];
 /// Most cells along an edge.
 const MOST_ALONG: usize = 16;

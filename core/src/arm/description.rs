@@ -12,7 +12,7 @@ use std::path::Path;
 
 use super::Frame;
 
-/// Numbers beyond this are no lengths of an arm, metres.
+/// Larger numbers are refused as lengths of an arm, metres.
 pub(super) const FAR_M: f64 = 20.0;
 
 /// A robot as its file describes it.

@@ -7,7 +7,7 @@
 use crate::grid::{Grid, VoxelSet};
 use rayon::prelude::*;
 
-/// Distances beyond this many voxels are all the same.
+/// Distances above this many voxels are not distinguished.
 const CAP: usize = 24;
 const FAR: i16 = (CAP * CAP) as i16;
 
@@ -67,7 +67,7 @@ impl DistanceField {
         &self.grid
     }
 
-    /// The largest distance that is told apart, metres.
+    /// The largest distance that is distinguished, metres.
     pub fn cap_m(&self) -> f64 {
         self.metres[CAP * CAP]
     }

@@ -1,8 +1,8 @@
-//! Where the hand can be to look, and how it gets from one place to the next.
+//! Which views the hand can reach, and how it moves from one to the next.
 //!
-//! A view counts only if the camera in hand can be there: some configuration within the joints' limits has it there,
-//! clear of table, shelf and the arm itself (upright, or upside down), and there is a way to it from where the arm waits. While it looks the arm
-//! stays out of the shelf altogether, whatever may stand in it.
+//! A view is offered only if the camera in hand can be there: there is a configuration within the joints' limits, clear
+//! of table, shelf and the arm itself (upright, or upside down), and a path to it from the waiting configuration. While
+//! the arm looks, it stays outside of the shelf, whatever stands in it.
 
 use super::plan::{PlanSettings, plan, turned};
 use super::pusher::ArmTool;
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 pub const HAND_M_S: f64 = 0.50;
 /// Attempts to shorten the way between two views.
 const SHORTCUTS: usize = 30;
-/// Places that the hand already reaches from which it is tried to go on to a view, the nearest first.
+/// Number of configurations already reached from which a straight path to a view is tried, the nearest first.
 const NEIGHBOURS: usize = 4;
 /// Work of the search for a view that no straight way leads to, and how many such searches may fail.
 const QUERY: PlanSettings = PlanSettings { rounds: 300, shortcuts: 20 };
@@ -26,10 +26,10 @@ const SEARCHES: usize = 4;
 /// How often the views that were not reached are tried again from what has been reached since.
 const PASSES: usize = 3;
 
-/// A place of the hand, and the way there from where the arm waits.
+/// A configuration with the hand at a view, and the path there from the waiting configuration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandPose {
-    /// Configurations from where the arm waits to the place, straight in between; never empty.
+    /// Configurations from the waiting one to this one, straight in between; never empty.
     way: Vec<Joints>,
 }
 
@@ -45,14 +45,14 @@ impl HandPose {
     }
 }
 
-/// Why the hand cannot be somewhere.
+/// Why the hand cannot reach a view.
 #[derive(Clone, Debug, PartialEq)]
 pub enum HandFault {
     /// No configuration within the limits has the camera there.
     OutOfReach,
     /// Something is in the way of the configuration that comes closest.
     Blocked(Hit),
-    /// It could be there, but no way there was found.
+    /// The configuration is free, but no path to it was found.
     NoWay,
 }
 

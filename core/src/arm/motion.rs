@@ -1,9 +1,9 @@
-//! Motions in time: a way through configurations within the joints' speeds.
+//! Timed motions: a path through configurations within the joints' speed limits.
 
 use super::{Arm, Joints};
 use serde::{Deserialize, Serialize};
 
-/// Time in which a joint comes to its full speed, seconds: a way starts and ends at rest.
+/// Time in which a joint comes to its full speed, seconds: a path starts and ends at rest.
 const RAMP_S: f64 = 0.15;
 /// Stops that stand for each ramp.
 const RAMP_STOPS: u32 = 4;
@@ -17,7 +17,7 @@ pub struct Stop {
     pub joints: Joints,
 }
 
-/// A way with its times: straight from stop to stop.
+/// A timed path: straight lines in joint space from stop to stop.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
     /// The stops, times ascending, the first at 0.

@@ -1,4 +1,5 @@
-//! Ways through a space: straight if that is free, else by two trees that grow towards each other, then shortened.
+//! Collision-free paths: straight if that is free, else by two trees that grow towards each other (RRT-Connect), then
+//! shortened.
 
 use super::Joints;
 use super::line::follow_line;
@@ -10,7 +11,7 @@ use super::space::Space;
 use crate::rng::ChaCha8Rng;
 use std::f64::consts::TAU;
 
-/// How much work a query may be.
+/// How much work a planning query may take.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanSettings {
     /// Rounds of the trees, each one extension and one attempt to connect, before the query is given up.
@@ -25,19 +26,20 @@ impl Default for PlanSettings {
     }
 }
 
-/// A way that was found.
+/// A path that was found.
 #[derive(Clone, Debug)]
 pub struct Planned {
     /// Configurations from the start to the goal, straight in between.
     pub path: Vec<Joints>,
-    /// Rounds that the trees took; 0 when the straight way was free.
+    /// Rounds that the trees took; 0 when the straight path was free.
     pub rounds: usize,
 }
 
-/// A free way from `start` to one of `goals`, or `None` when there is none or it was not found in time.
+/// A collision-free path from `start` to one of `goals`, or `None` when there is none or it was not found in time.
 ///
-/// Each goal is a chain: its first configuration is the goal, and from any later one the chain back to the goal is known
-/// to be free (an arm backs out of a shelf the way it would go in). The same stream finds the same way.
+/// Each goal is a chain: its first configuration is the goal, and from any later one the chain back to the goal is
+/// known to be free (an arm backs out of a shelf along the path by which it would go in). The same stream finds the
+/// same path.
 pub fn plan(
     space: &Space<'_>,
     start: &Joints,

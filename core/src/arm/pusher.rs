@@ -1,4 +1,4 @@
-//! What carries pushes out: an arm before its shelf, and its motion for one push.
+//! An arm before its shelf, and its motion for one push.
 
 use super::{Arm, Joints, Motion, Space};
 use crate::arm::Push;
@@ -20,7 +20,8 @@ pub struct ArmTool {
     pub arm: Arm,
     /// The shelf.
     pub shelf: Shelf,
-    /// Where the arm waits between pushes; `None` when it reaches no place before the shelf, and then nothing in it.
+    /// The configuration in which the arm waits between pushes; `None` when it reaches no place before the shelf, and
+    /// then nothing in it.
     pub ready: Option<Joints>,
 }
 
@@ -36,7 +37,7 @@ impl ArmTool {
         Self::new(Arm::standard(&RobotPlacement::default()), shelf)
     }
 
-    /// The arm before its shelf, of which nothing else is known.
+    /// The arm before its shelf, with no map of what stands in it.
     pub fn space(&self) -> Space<'_> {
         Space::empty(&self.arm, &self.shelf)
     }

@@ -1,4 +1,4 @@
-//! Where the arm waits: with its tool before the shelf, clear of everything, ready to go straight in.
+//! The waiting configuration: the tool before the shelf, clear of everything, ready to go straight in.
 
 use super::line::{LINE_STEP_M, follow_line};
 use super::space::Space;

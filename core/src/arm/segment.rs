@@ -1,9 +1,9 @@
-//! Whether the straight way between two configurations is free: by clearance, not by fixed steps.
+//! Whether the straight line between two configurations is collision-free: by clearance, not by fixed steps.
 //!
-//! The room of a part of the arm at a configuration tells how far the part may move from there, whatever the way. So a
-//! segment is free for a part once its room at both ends spans how far it moves in between; if not, the segment is halved
-//! and only the parts in doubt are asked again (Schwarzer, Saha and Latombe 2005, per pair of bodies). Nothing thin is
-//! jumped over, and the parts that are far from everything cost nothing.
+//! The clearance of a part of the arm at a configuration says how far the part may move from there in any direction. So
+//! a segment is free for a part if its clearances at both ends add up to how far it moves in between. If not, the
+//! segment is halved, and only the parts in doubt are checked again (Schwarzer, Saha and Latombe 2005, per pair of
+//! bodies). Nothing thin is jumped over, and the parts that are far from everything cost nothing.
 
 use super::model::JointKind;
 use super::space::Space;
@@ -12,16 +12,16 @@ use super::{BodyPoses, Joints, MAX_JOINTS};
 /// Gaps smaller than this between what two configurations are known to have free are taken for free, metres: half of
 /// it may be lost of a margin of 5 mm or more.
 const GAP_M: f64 = 0.004;
-/// Room beyond this is not told apart, metres.
+/// Clearance above this is not distinguished, metres.
 const PLENTY_M: f64 = 0.10;
 
-/// The arm in a configuration, with the room of its parts. An item is a part by its position in [`super::Arm::parts`],
-/// or after them a pair of parts that may meet.
+/// The arm in a configuration, with the clearance of its parts. An item is a part by its position in
+/// [`super::Arm::parts`], or after them a pair of parts that may meet.
 #[derive(Clone)]
 pub(super) struct Probe {
     pub at: Joints,
     poses: BodyPoses,
-    /// Room per item, metres; infinite where it was not asked for.
+    /// Clearance per item, metres; infinite where it was not asked for.
     room_m: Vec<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Shortening a way: two random points on it are joined straight wherever that is free.
+//! Path shortening: two random points of a path are joined by a straight line wherever that is free.
 
 use super::Joints;
 use super::segment::is_segment_free;
@@ -6,14 +6,15 @@ use super::space::Space;
 use crate::rng::ChaCha8Rng;
 use rand::Rng;
 
-/// A point on a way.
+/// A point on a path.
 struct OnWay {
     /// The segment that it lies on.
     segment: usize,
     at: Joints,
 }
 
-/// The way after `attempts` attempts to leave out what lies between two points of it. Never longer than before.
+/// The path after `attempts` attempts to replace the part between two of its points by a straight line. Never longer
+/// than before.
 pub(super) fn shortcut(space: &Space<'_>, mut path: Vec<Joints>, attempts: usize, rng: &mut ChaCha8Rng) -> Vec<Joints> {
     if path.len() > 2 && is_segment_free(space, &path[0], &path[path.len() - 1]) {
         return vec![path[0], path[path.len() - 1]];

@@ -67,7 +67,7 @@ pub(super) struct MapObstacles<'a> {
 }
 
 impl<'a> Space<'a> {
-    /// The arm before a shelf of which nothing is known.
+    /// The arm before an empty shelf.
     pub fn empty(arm: &'a Arm, shelf: &Shelf) -> Self {
         let (min, max) = (shelf.min().map(f64::from), shelf.max().map(f64::from));
         let t = PANEL_M;

@@ -1,14 +1,14 @@
-//! What a push meets first and carries along, as far as a belief tells.
+//! The object that a push touches first and moves along, according to a belief.
 
 use super::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, SweptPush, beta_mean};
 use crate::{Point, Vector};
 
-/// Occupancy probability from which a voxel counts as part of a thing.
+/// Occupancy probability from which a voxel counts as part of an object.
 pub(crate) const SOLID: f32 = 0.6;
 
-/// What a push passes through, per floor cell.
+/// What a push passes through, for every floor cell.
 pub(super) struct Met {
-    /// Largest probability that something was met; negative where nothing passed.
+    /// Largest occupancy probability that the sweep passes through; negative where it does not pass.
     pub(super) probability: Vec<f32>,
     /// Lowest voxel that was passed; the grid's height where nothing passed.
     pub(super) lowest: Vec<usize>,
@@ -47,8 +47,8 @@ impl Track {
     }
 }
 
-/// The object that the tool meets first, and how far it goes with the tool: by what is left of the push after the
-/// contact, up to the walls. It neither turns nor pushes others.
+/// The object that the tool touches first, and how far it moves: with the tool for the rest of the push, at most up to
+/// the walls. It is assumed neither to turn nor to push other objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Carried {
     patch: Patch,
@@ -58,8 +58,8 @@ pub(crate) struct Carried {
 }
 
 impl Carried {
-    /// What `push` carries along; `None` when it meets nothing that is believed to be there. `plan` holds the belief's
-    /// things ([`SOLID`]).
+    /// The object that `push` moves; `None` when it touches nothing that is believed occupied. `plan` holds the
+    /// occupied floor cells ([`SOLID`]).
     #[cfg(feature = "cnabu")]
     pub(crate) fn by(push: &SweptPush, belief: &Belief, plan: &FloorPlan) -> Option<Self> {
         Self::of(belief, plan, &Met::of(belief, push), &Track::of(push))
@@ -89,7 +89,7 @@ impl Carried {
         self.patch.contains(cell)
     }
 
-    /// Where what comes to stand on a floor cell comes from.
+    /// The floor cell from which the object comes to a floor cell; `None` where it does not come.
     pub(crate) fn source(&self, cell: usize) -> Option<usize> {
         let x = (cell / self.dims[1]).checked_add_signed(-self.shift[0]).filter(|x| *x < self.dims[0])?;
         let y = (cell % self.dims[1]).checked_add_signed(-self.shift[1]).filter(|y| *y < self.dims[1])?;

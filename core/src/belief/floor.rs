@@ -1,4 +1,4 @@
-//! What stands where on the board, as far as a belief tells: floor cells, their labels, and patches of one object.
+//! Where objects stand on the board according to a belief: floor cells, their labels, and the patch of one object.
 
 use super::{Belief, beta_mean};
 use crate::grid::Grid;

@@ -1,29 +1,31 @@
-//! What looks have seen, and how a look changes a belief that wears.
+//! Which voxels looks have seen, and how the belief of a network is kept from drifting.
 //!
-//! A network that learned to take in ten looks gets worse by forty: what it holds of a place of which nothing new is seen
-//! drifts with every further look. So after the first looks ([`LOOKS_TAKEN`]) a look changes such a belief only near what
-//! it shows for the first time ([`NEWS_REACH_M`]).
+//! A network that was trained on ten looks is applied up to forty times. Then the belief drifts: cells about which a
+//! look says nothing new still change a little with every look, and the map gets worse (RESULTS.md). So the first looks
+//! ([`LOOKS_TAKEN`]) change a column of the grid freely; after that a look changes it only near voxels that it sees for
+//! the first time ([`NEWS_REACH_M`]).
 
 use super::{Belief, BeliefUpdate, PushPrediction};
 use crate::camera::MapObservation;
 use crate::grid::{Grid, VoxelSet};
 
-/// How far from what a look shows for the first time it changes a belief that wears, along x and along y, metres.
+/// A look changes a drifting belief within this distance of voxels that it sees for the first time, along x and along
+/// y, metres.
 pub const NEWS_REACH_M: f32 = 0.08;
-/// How many voxels above a floor cell must be seen for the first time to be news of it; a single one is on the rim of a
-/// shadow.
+/// Voxels of a column that a look must see for the first time for the column to count as new; a single voxel is on the
+/// rim of a shadow.
 const NEWS_VOXELS: u32 = 2;
-/// So many looks change a floor cell's column in any case, news or not: they still make the map better.
+/// So many looks change a column freely: they still make the map better.
 pub const LOOKS_TAKEN: u8 = 5;
-/// Probability of change of a floor cell from which what was seen of it counts as unseen after a push.
+/// Probability that a push changed a floor cell above which its column counts as unseen again.
 pub const CHANGED: f32 = 0.1;
 
-/// The voxels that looks have seen and that no push may have changed since.
+/// The voxels that looks have seen and that no push has probably changed since.
 #[derive(Clone, Debug)]
 pub struct Sightings {
     grid: Grid,
     seen: VoxelSet,
-    /// Looks that changed each floor cell's column of a belief that wears.
+    /// Number of looks that changed each column of a drifting belief.
     taken: Vec<u8>,
 }
 
@@ -38,14 +40,14 @@ impl Sightings {
         &self.seen
     }
 
-    /// Takes down what a look sees.
+    /// Adds the voxels that a look sees.
     fn add(&mut self, observation: &MapObservation) {
         self.seen.union_with(&observation.occupied);
         self.seen.union_with(&observation.free);
     }
 
-    /// What was seen of columns that a push may have changed ([`CHANGED`]) is not seen any more, and no look has changed
-    /// them yet.
+    /// After a push: columns that it has probably changed ([`CHANGED`]) count as unseen, and their number of looks
+    /// starts at 0.
     pub fn forget_changed(&mut self, prediction: &PushPrediction) {
         let grid = self.grid;
         let cells = prediction.window.cells(&grid).zip(&prediction.change);
@@ -55,8 +57,8 @@ impl Sightings {
         }
     }
 
-    /// Takes down a look, and tells per floor cell whether it changes a belief that wears there: where few looks have
-    /// changed it yet, or within [`NEWS_REACH_M`] of what this one shows for the first time.
+    /// Adds a look. Returns for every floor cell whether the look may change the column of a drifting belief: where few
+    /// looks have changed it yet, or within [`NEWS_REACH_M`] of what this look sees for the first time.
     fn take(&mut self, observation: &MapObservation) -> Vec<bool> {
         let [width, depth, height] = self.grid.dims;
         let mut new = observation.free.clone();
@@ -91,9 +93,9 @@ impl Sightings {
     }
 }
 
-/// The belief after a look, which `sightings` takes down. A belief that does not wear ([`BeliefUpdate::wears`]) is updated
-/// everywhere; of one that does, columns that enough looks have changed stay as they are far from what is seen for the
-/// first time.
+/// The belief after a look; `sightings` is updated too. A belief that does not drift ([`BeliefUpdate::wears`]) is
+/// updated everywhere; one that does keeps the columns that enough looks have changed and that are far from what is
+/// seen for the first time.
 pub fn look(
     update: &dyn BeliefUpdate,
     belief: &Belief,

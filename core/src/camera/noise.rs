@@ -3,7 +3,7 @@
 use super::{Image, Intrinsics, View, render};
 use crate::rng;
 use crate::scene::{Body, OBJECT_CLASS_COUNT, Shelf};
-use crate::{Pose, Vector};
+use crate::{Error, Pose, Result, Vector};
 use nalgebra::{Translation3, UnitQuaternion};
 use rand::Rng;
 use rayon::prelude::*;
@@ -60,6 +60,29 @@ impl NoiseModel {
         position_sigma_m: 0.002,
         rotation_sigma_deg: 0.2,
     };
+
+    /// The models that have names.
+    pub const NAMED: [(&'static str, Self); 2] = [("none", Self::OFF), ("standard", Self::STANDARD)];
+
+    /// The model of a name, as episodes keep it: nothing where there is no noise.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another name: names those that there are.
+    pub fn named(name: &str) -> Result<Option<Self>> {
+        let found = Self::NAMED.into_iter().find(|(known, _)| *known == name);
+        let (_, model) = found.ok_or_else(|| {
+            let known = Self::NAMED.map(|(known, _)| known).join(", ");
+            Error::Usage(format!("unknown noise \"{name}\"; there are {known}"))
+        })?;
+        Ok(Some(model).filter(|model| *model != Self::OFF))
+    }
+
+    /// The name of what an episode keeps, or its numbers where it has none.
+    pub fn name_of(noise: Option<Self>) -> String {
+        let model = noise.unwrap_or(Self::OFF);
+        let named = Self::NAMED.into_iter().find(|(_, known)| *known == model);
+        named.map_or_else(|| format!("{model:?}"), |(name, _)| name.to_owned())
+    }
 
     /// Takes an image with this noise. `index` tells the images of one seed apart (the step of an episode).
     ///
@@ -176,6 +199,20 @@ mod tests {
         assert!((wrong - 0.05).abs() < 0.006, "{wrong}");
         assert!(image.labels.chunks(10).all(|segment| segment.iter().all(|label| *label == segment[0])));
         assert!(image.labels.iter().all(|label| usize::from(*label) < OBJECT_CLASS_COUNT));
+    }
+
+    #[test]
+    fn noise_has_names_and_others_are_answered_with_them() {
+        for (name, model) in NoiseModel::NAMED {
+            let kept = NoiseModel::named(name).expect("a known name");
+            assert_eq!(kept.unwrap_or(NoiseModel::OFF), model);
+            assert_eq!(NoiseModel::name_of(kept), name);
+        }
+        assert_eq!(NoiseModel::named("none").expect("known"), None, "an episode without noise keeps no numbers");
+        let said = NoiseModel::named("l515").expect_err("unknown").to_string();
+        assert_eq!(said, "unknown noise \"l515\"; there are none, standard");
+        let own = NoiseModel { outlier_share: 0.25, ..NoiseModel::STANDARD };
+        assert!(NoiseModel::name_of(Some(own)).contains("outlier_share: 0.25"));
     }
 
     #[test]

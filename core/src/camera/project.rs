@@ -1,6 +1,7 @@
-//! From an image to what it says about the grid: voxels seen through, voxels seen as surface, and labels from above.
+//! Projection of an image into the grid: free voxels that rays pass, occupied voxels that they hit, and labels from
+//! above.
 //!
-//! Three rules decide where evidence meets evidence:
+//! Three rules decide where observations contradict each other:
 //!
 //! * A voxel with a hit is occupied, even where other rays pass through it (an edge crosses it).
 //! * A hit on board, walls, back or ceiling is never occupied. Pixels labelled background are such hits; so are those of

@@ -51,7 +51,7 @@ pub fn hidden_objects(shelf: &Shelf, bodies: &[Body], array: &ViewArray) -> Vec<
     hidden_objects_while(shelf, bodies, array, || true).unwrap_or_default()
 }
 
-/// The same, given up as soon as `go_on`, asked between rounds of a few views, says no: `None` then.
+/// The same; `None` if `go_on`, which is called between rounds of a few views, returns false.
 pub fn hidden_objects_while(
     shelf: &Shelf,
     bodies: &[Body],

@@ -176,14 +176,15 @@ impl Layout {
         }
     }
 
-    /// Where what a push carries along stood, and where it comes to: two times [`SUBS`] planes (zero before).
+    /// Where the object that a push moves stood, and where it comes to: two times [`SUBS`] planes (zero before).
     pub(crate) fn put_carried(&self, carried: &Carried, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
         let (stood, comes) = out.split_at_mut(SUBS * x.len() * self.pixels[1]);
         self.put_cells(|cell| carried.stood(cell), mirror, x.clone(), stood);
         self.put_cells(|cell| carried.source(cell).is_some(), mirror, x, comes);
     }
 
-    /// Channels of the (mirrored) whole `planes`, carried along to where they come to in the pixels `x` (zero before).
+    /// Channels of the (mirrored) whole `planes`, shifted with the moved object to where it comes to in the pixels `x`
+    /// (zero before).
     pub(crate) fn put_arriving(
         &self,
         carried: &Carried,

@@ -5,11 +5,11 @@
 //! * expected: `sum_j y_j (digamma(S) - digamma(a_j))`, the cross-entropy expected under the Dirichlet (Sensoy et al. 2018);
 //! * marginal: `sum_j y_j (ln S - ln a_j)`, the cross-entropy of the Dirichlet's mean (type II likelihood), which costs a
 //!   logarithm in place of a digamma and is what the networks are trained with;
-//! * plus `k KL(Dir(a~) || Dir(1))` with `a~ = y + (1 - y) a`: evidence for what is not so is to vanish.
+//! * plus `k KL(Dir(a~) || Dir(1))` with `a~ = y + (1 - y) a`, which drives the evidence for wrong classes to zero.
 //!
-//! Networks give `z` with `a = 1 + e^z`, so that `a` is above one, `ln a = softplus(z)`, and no `z` is without a gradient.
-//! The training losses take `z` and truths that may be shared between two classes (a level that an object's top cuts in
-//! half): every term is linear in `y`.
+//! Networks give `z` with `a = 1 + e^z`, so that `a` is above one, `ln a = softplus(z)`, and the gradient never
+//! vanishes altogether. The training losses take `z` and truths that may be shared between two classes (a level that an
+//! object's top cuts in half): every term is linear in `y`.
 
 use tch::Tensor;
 

@@ -1,9 +1,9 @@
 //! sigma_o: from prior evidence and an observation to posterior evidence.
 //!
-//! A U-Net sees everything through a narrow stem and completes what was not seen: the far sides and insides of objects.
-//! What is already known does not have to squeeze through it: prior evidence and observation lead past it to the heads,
-//! scaled per level or class, so that an untrained network already adds up what it is told. A semantic head of its own sees
-//! the labels, the prior Dirichlet and a slice of the occupancy posterior 3 cm above the board.
+//! A U-Net sees all inputs through a narrow stem and completes what was not seen: the back sides and insides of
+//! objects. Skip connections lead prior evidence and observation past it to the heads, scaled per level or class, so
+//! that already an untrained network adds the observation to the prior. A semantic head of its own sees the labels, the
+//! prior Dirichlet and a slice of the occupancy posterior 3 cm above the board.
 
 use super::layout::{LABELS, LEVELS, OCCUPANCY, SEMANTICS, SUBS};
 use super::net::{Network, UNet, conv};
@@ -13,12 +13,12 @@ use tch::{Kind, Tensor};
 
 /// Level of the slice that the semantic head sees: 3 cm above the board.
 const SLICE_LEVEL: i64 = 3;
-/// Largest `ln a` that is carried on: evidence of about 1,100.
+/// Largest `ln a` of a state: evidence of about 1,100.
 pub(super) const LOG_EVIDENCE_LIMIT: f64 = 7.0;
 
 /// `z` of `kinds` kinds (occupied and free, or classes; `[B, kinds * ..., X, Y]`) with the evidence limited: where the
-/// largest is above [`LOG_EVIDENCE_LIMIT`] all kinds are lowered alike, so that the mean stays what it was. (Cut one by one,
-/// all kinds above the limit would become equally probable.)
+/// largest is above [`LOG_EVIDENCE_LIMIT`] all kinds are lowered by the same amount, so that the mean does not change.
+/// (Clipped one by one, all kinds above the limit would become equally probable.)
 pub(super) fn limited(z: &Tensor, kinds: usize) -> Tensor {
     let size = z.size();
     let by_kind = z.view([size[0], kinds as i64, -1, size[2], size[3]]);
@@ -48,6 +48,11 @@ impl Evidence {
         Self { occupancy: log(z_occupancy, 2), semantics: log(z_semantics, CLASS_COUNT) }
     }
 
+    /// The same numbers, not copied, for another thread.
+    pub(super) fn shared(&self) -> Self {
+        Self { occupancy: self.occupancy.shallow_clone(), semantics: self.semantics.shallow_clone() }
+    }
+
     /// The same on a device.
     pub fn to_device(&self, device: tch::Device) -> Self {
         Self { occupancy: self.occupancy.to_device(device), semantics: self.semantics.to_device(device) }
@@ -66,15 +71,26 @@ impl Evidence {
 
     /// The same with left and right exchanged; for planes without padding.
     pub fn mirrored(&self) -> Self {
-        Self { occupancy: mirrored(&self.occupancy), semantics: mirrored(&self.semantics) }
+        let cells = 2 * self.occupancy.size()[2];
+        Self { occupancy: mirrored(&self.occupancy, cells), semantics: mirrored(&self.semantics, cells) }
     }
 }
 
-/// Planes (`[B, quantities * 4, X, Y]`) with left and right exchanged; for planes without padding.
-fn mirrored(planes: &Tensor) -> Tensor {
+/// Planes (`[B, quantities * 4, X, Y]`) with left and right exchanged among the first `cells` floor cells along x. What lies
+/// beyond is padding, and stays: the shelf is mirrored, not its surroundings.
+pub(super) fn mirrored(planes: &Tensor, cells: i64) -> Tensor {
     let size = planes.size();
     // A channel is a quantity and a sub-cell `2 (x % 2) + y % 2`; along x both pixels and sub-cells turn round.
-    planes.view([size[0], -1, 2, 2, size[2], size[3]]).flip([2, 4]).view(&size[..])
+    let folded = planes.view([size[0], -1, 2, 2, size[2], size[3]]);
+    let all = 2 * size[2];
+    if cells == all {
+        return folded.flip([2, 4]).view(&size[..]);
+    }
+    // Sub-cells beside their pixels, so that floor cells along x are one axis.
+    let order: Vec<i64> = (0..cells).rev().chain(cells..all).collect();
+    let order = Tensor::from_slice(&order).to_device(planes.device());
+    let rows = folded.permute([0, 1, 3, 4, 2, 5]).reshape([size[0], -1, 2, all, size[3]]).index_select(3, &order);
+    rows.view([size[0], -1, 2, size[2], 2, size[3]]).permute([0, 1, 4, 2, 3, 5]).reshape(&size[..])
 }
 
 /// The network sigma_o.
@@ -174,20 +190,6 @@ impl ObserveNet {
         (z_occupancy, z_semantics)
     }
 
-    /// The posterior that [`ObserveNet::forward`] gives for the scene and for its mirror image, turned back: the mean of both
-    /// `z`. What stands in a shelf does not depend on which side is called left, and where the two disagree neither is
-    /// certain. For planes without padding.
-    pub fn forward_both_ways(&self, prior: &Evidence, observed: &Tensor, labels: &Tensor) -> (Tensor, Tensor) {
-        let both = |planes: &Tensor| Tensor::cat(&[planes, &mirrored(planes)], 0);
-        let prior = Evidence { occupancy: both(&prior.occupancy), semantics: both(&prior.semantics) };
-        let (z_occupancy, z_semantics) = self.forward(&prior, &both(observed), &both(labels));
-        let mean = |z: &Tensor| {
-            let halves = z.chunk(2, 0);
-            (&halves[0] + mirrored(&halves[1])) * 0.5
-        };
-        (mean(&z_occupancy), mean(&z_semantics))
-    }
-
     /// Numbers of levels and classes that the planes hold.
     pub fn counts() -> (usize, usize) {
         (LEVELS, CLASS_COUNT)
@@ -196,28 +198,18 @@ impl ObserveNet {
 
 #[cfg(test)]
 mod tests {
-    use super::{Evidence, LABELS, LOG_EVIDENCE_LIMIT, Network, OCCUPANCY, ObserveNet, SEMANTICS, limited, mirrored};
-    use tch::nn::VarStore;
-    use tch::{Device, Kind, Tensor};
+    use super::{LOG_EVIDENCE_LIMIT, limited, mirrored};
+    use tch::Tensor;
 
     #[test]
-    fn both_ways_give_the_mirrored_scene_the_mirrored_posterior() {
-        tch::manual_seed(3);
-        let store = VarStore::new(Device::Cpu);
-        let net = ObserveNet::new(&store.root(), 8);
-        let planes = |channels: usize| Tensor::rand([1, channels as i64, 16, 8], (Kind::Float, Device::Cpu));
-        let prior = Evidence { occupancy: planes(2 * OCCUPANCY), semantics: planes(SEMANTICS) };
-        let (observed, labels) = (planes(2 * OCCUPANCY).round(), planes(LABELS).round());
-        let far = |a: &Tensor, b: &Tensor| (a - b).abs().max().double_value(&[]);
-        tch::no_grad(|| {
-            let here = net.forward_both_ways(&prior, &observed, &labels);
-            let there = net.forward_both_ways(&prior.mirrored(), &mirrored(&observed), &mirrored(&labels));
-            assert!(far(&mirrored(&here.0), &there.0) < 1e-4 && far(&mirrored(&here.1), &there.1) < 1e-4);
-            // One way alone does not: the network would have to have learned it.
-            let alone = net.forward(&prior, &observed, &labels);
-            let turned = net.forward(&prior.mirrored(), &mirrored(&observed), &mirrored(&labels));
-            assert!(far(&mirrored(&alone.0), &turned.0) > 1e-2);
-        });
+    fn only_the_shelf_is_mirrored_and_not_its_padding() {
+        // Two sub-cells along x and one row: four floor cells, numbered along x, of which three are the shelf.
+        let planes = Tensor::from_slice(&[0_i64, 2, 0, 2, 1, 3, 1, 3]).reshape([1, 4, 2, 1]);
+        let turned = Vec::<i64>::try_from(mirrored(&planes, 3).flatten(0, -1)).expect("numbers");
+        assert_eq!(turned, [2, 0, 2, 0, 1, 3, 1, 3]);
+        assert!(mirrored(&mirrored(&planes, 3), 3).equal(&planes), "twice is as it was");
+        let turned = Vec::<i64>::try_from(mirrored(&planes, 4).flatten(0, -1)).expect("numbers");
+        assert_eq!(turned, [3, 1, 3, 1, 2, 0, 2, 0]);
     }
 
     #[test]

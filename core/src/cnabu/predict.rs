@@ -3,7 +3,8 @@
 
 use super::layout::{LEVELS, Layout, Mirror, OCCUPANCY, SEMANTICS, SUBS, VOXELS_PER_LEVEL};
 use super::observe_net::{Evidence, LOG_EVIDENCE_LIMIT};
-use super::push_net::{Body, MARKS, Pixels, PushNet, PushPlanes, WINDOW};
+use super::push_net::{Body, MARKS, Pixels, PriorParts, PushNet, PushPlanes, WINDOW};
+use super::update::Pool;
 use crate::belief::{Belief, Carried, FloorPlan, PushPrediction, SOLID, SweptPush};
 use crate::grid::Window;
 use crate::scene::CLASS_COUNT;
@@ -11,12 +12,12 @@ use rayon::prelude::*;
 use std::ops::Range;
 use tch::{Device, Kind, Tensor};
 
-/// Candidates that go through the network together.
-const BATCH: usize = 16;
+/// Candidates that go through the network together; batches go through side by side.
+const BATCH: usize = 8;
 /// Probability of change below which a floor cell keeps its belief as it is.
 const CHANGE_FLOOR: f32 = 0.05;
 
-/// A push, what it carries along, and the pixels of its window.
+/// A push, the object that it moves, and the pixels of its window.
 pub(crate) struct Windowed<'a> {
     pub(crate) push: &'a SweptPush,
     pub(crate) carried: Option<&'a Carried>,
@@ -40,8 +41,8 @@ pub(super) fn values(tensor: &Tensor) -> Vec<f32> {
     out
 }
 
-/// What pushes look like to the network, in windows (of mirrored planes, if so), from the logarithms of the (mirrored)
-/// prior's evidence.
+/// Inputs that describe pushes to the network, in windows (of mirrored planes, if asked for), from the logarithms of
+/// the (mirrored) prior's evidence.
 pub(crate) fn push_planes(layout: &Layout, prior: &Numbers, pushes: &[Windowed<'_>], mirror: Mirror) -> PushPlanes {
     let width = pushes.first().map_or(0, |push| push.x.len());
     let across = layout.pixels()[1];
@@ -71,22 +72,24 @@ pub(crate) fn push_planes(layout: &Layout, prior: &Numbers, pushes: &[Windowed<'
     }
 }
 
-/// The predictions of a network for pushes from one belief, whose evidence is `prior`; its log-odds of change are divided
-/// by `temperature`.
+/// The predictions of sigma_m for pushes from one belief, whose evidence is `prior`; its log-odds of change are divided by
+/// its temperature. `None` where there is no sigma_m.
 pub(super) fn predict(
-    net: &PushNet,
-    temperature: f32,
+    pool: &Pool,
     layout: &Layout,
     prior: &Evidence,
     belief: &Belief,
     pushes: &[SweptPush],
-    device: Device,
-) -> Vec<PushPrediction> {
-    let parts = net.prior_parts(prior);
+) -> Option<Vec<PushPrediction>> {
+    let (parts, temperature, device) = {
+        let networks = pool.take();
+        let (net, temperature) = networks.push.as_ref()?;
+        (tch::no_grad(|| net.prior_parts(prior)), *temperature, networks.device())
+    };
     let numbers = Numbers::of(prior);
     let plan = FloorPlan::new(belief, SOLID);
-    let mut predictions = Vec::with_capacity(pushes.len());
-    for batch in pushes.chunks(BATCH) {
+    let batches: Vec<_> = pushes.chunks(BATCH).map(|batch| (batch, parts.shared(), prior.shared())).collect();
+    let predict = |(batch, parts, prior): (&[SweptPush], PriorParts, Evidence)| {
         let carried: Vec<_> = batch.par_iter().map(|push| Carried::by(push, belief, &plan)).collect();
         let windowed: Vec<_> = batch
             .iter()
@@ -95,12 +98,12 @@ pub(super) fn predict(
             .collect();
         let xs: Vec<Range<usize>> = windowed.iter().map(|push| push.x.clone()).collect();
         let planes = push_planes(layout, &numbers, &windowed, Mirror::No).to_device(device);
-        let body = net.body(&parts.windows(&xs), &planes);
+        let body = with_net(pool, |net| net.body(&parts.windows(&xs), &planes))?;
         let z = values(&body.change);
         let (z, each) = (&z[..], z.len() / xs.len());
         let changing: Vec<Changing> =
             z.par_chunks(each).zip(&xs).map(|(z, x)| Changing::new(z, temperature, layout, x.clone())).collect();
-        let heads = Heads::of(net, prior, &body, &planes, &changing, layout, device);
+        let heads = with_net(pool, |net| Heads::of(net, &prior, &body, &planes, &changing, layout, device))?;
         let mut next = 0;
         let firsts = changing.iter().map(|changing| {
             next += changing.pixels.len();
@@ -108,9 +111,16 @@ pub(super) fn predict(
         });
         let firsts: Vec<usize> = firsts.collect();
         let each = changing.par_iter().zip(firsts).map(|(changing, first)| heads.prediction(changing, first, belief));
-        predictions.par_extend(each);
-    }
-    predictions
+        Some(each.collect::<Vec<_>>())
+    };
+    let predictions: Option<Vec<Vec<PushPrediction>>> = batches.into_par_iter().map(predict).collect();
+    predictions.map(|batches| batches.into_iter().flatten().collect())
+}
+
+/// What one of the pool's sigma_m answers; `work` asks nothing of rayon.
+fn with_net<T>(pool: &Pool, work: impl FnOnce(&PushNet) -> T) -> Option<T> {
+    let networks = pool.take();
+    networks.push.as_ref().map(|(net, _)| tch::no_grad(|| work(net)))
 }
 
 /// Where a push is likely to change something.
@@ -262,11 +272,12 @@ fn evidence<const K: usize>(z: [f32; K]) -> [f32; K] {
     z.map(|z| 1.0 + (z - above).exp())
 }
 
-/// What is believed when with probability `p` a cell changes, and then has evidence `after`, and else keeps its evidence.
+/// The belief of a cell that changes with probability `p` and then has evidence `after`, and otherwise keeps its
+/// evidence.
 ///
-/// The means are mixed, `P = (1 - p) P_kept + p P_changed`, and so are the epistemic uncertainties `K / sum(a)`. (Mixing
-/// the evidence itself, `(1 - p) a + p a_changed`, would let what was once well known drown a prediction that is
-/// honestly unsure, however probable the change.)
+/// The means are mixed, `P = (1 - p) P_kept + p P_changed`, and so are the epistemic uncertainties `K / sum(a)`.
+/// (Mixing the evidence itself, `(1 - p) a + p a_changed`, would let large old evidence outweigh an uncertain
+/// prediction, however probable the change is.)
 #[inline(always)]
 fn gated<const K: usize>(kept: &[f32; K], after: &[f32; K], p: f32) -> [f32; K] {
     let [kept_weight, after_weight] = [(kept, 1.0 - p), (after, p)].map(|(a, share)| share / a.iter().sum::<f32>());

@@ -1,14 +1,15 @@
 //! sigma_m: from prior evidence and a push to the evidence that the push is predicted to leave, and where it changes
 //! anything.
 //!
-//! The network sees a window of the floor plan around the push: as wide as the tool and what it moves can reach, and as
-//! deep as the shelf. Its stem is made of 1 x 1 convolutions, so the prior's part is computed once for all candidates of a
-//! decision and cut out per window. As in sigma_o the prior leads past the U-Net to the heads. These look at one pixel at a
-//! time, so that they are computed only where something is likely to change.
+//! The network sees a window of the floor plan around the push: as wide as a push can change anything, and as deep as
+//! the shelf. Its stem is made of 1 x 1 convolutions, so the prior's part is computed once for all candidates of a
+//! decision and cut out per window. As in sigma_o, skip connections lead the prior past the U-Net to the heads. The
+//! heads look at one pixel at a time, so they are computed only where something is likely to change.
 //!
-//! Convolutions are bad at carrying a class or a height over 10 cm of floor. So the network is also shown a guess: the
-//! evidence of what the tool meets first, moved with the tool (the classical rule's guess, without a turn and without
-//! what is pushed in turn). It leads past the U-Net too; what becomes of it is learnt.
+//! Convolutions are bad at moving a class or a height over 10 cm of floor. So a further input is a guess: the evidence
+//! of the first object that the tool touches, moved with the tool (the guess of the classical rule; the object does not
+//! turn and pushes no other). A skip connection leads it past the U-Net too, and the network learns how far to trust
+//! it.
 
 use super::layout::{OCCUPANCY, SEMANTICS, SUBS};
 use super::net::{Network, UNet, conv};
@@ -19,12 +20,12 @@ use tch::nn::{self, Module};
 
 /// Pixels of the window along x: 0.4 m.
 pub(crate) const WINDOW: usize = 40;
-/// Planes that mark floor cells: where the push starts, where it ends, where what it carries along stood, where that comes to.
+/// Planes that mark floor cells: the start of the push, its end, where the moved object stood, and where it comes to.
 pub(super) const MARKS: usize = 4 * SUBS;
 /// Planes of the change of floor cells: for and against.
 const CHANGE: usize = 2 * SUBS;
 
-/// What the heads give: `z` with `a = 1 + e^z`.
+/// Outputs of the heads: `z` with `a = 1 + e^z`.
 #[derive(Debug)]
 pub struct Pushed {
     /// `[B, 2 * levels * 4, WINDOW, Y]`: occupied, then free, where something changes.
@@ -35,7 +36,7 @@ pub struct Pushed {
     pub change: Tensor,
 }
 
-/// The prior's part of what is computed, over the whole floor plan: once for all candidates of a decision.
+/// Features of the prior over the whole floor plan: computed once for all candidates of a decision.
 #[derive(Debug)]
 pub struct PriorParts {
     stem: Tensor,
@@ -43,6 +44,11 @@ pub struct PriorParts {
 }
 
 impl PriorParts {
+    /// The same numbers, not copied, for another thread.
+    pub(super) fn shared(&self) -> Self {
+        Self { stem: self.stem.shallow_clone(), labels: self.labels.shallow_clone() }
+    }
+
     /// Cut to windows, one above the other.
     pub(crate) fn windows(&self, xs: &[Range<usize>]) -> Self {
         Self { stem: windows(&self.stem, xs), labels: windows(&self.labels, xs) }
@@ -103,14 +109,14 @@ impl Body {
     }
 }
 
-/// What pushes look like, in windows.
+/// Inputs that describe pushes, in windows.
 #[derive(Debug)]
 pub struct PushPlanes {
     /// `[B, levels * 4, WINDOW, Y]`: what the tool and the arm sweep.
     pub swept: Tensor,
-    /// `[B, 4 * 4, WINDOW, Y]`: start and end; where what is carried along stood, and where it comes to.
+    /// `[B, 4 * 4, WINDOW, Y]`: start and end; where the moved object stood, and where it comes to.
     pub marks: Tensor,
-    /// The logarithms of the evidence that is carried along, where it comes to; 0 elsewhere.
+    /// The logarithms of the evidence of the moved object, where it comes to; 0 elsewhere.
     pub arriving: Evidence,
 }
 
@@ -147,7 +153,7 @@ pub struct PushNet {
     keep_semantics: Tensor,
     /// Per channel: what being swept adds to `z`.
     swept: Tensor,
-    /// Per channel: what the evidence that is carried along adds to `z`.
+    /// Per channel: what the evidence of the moved object adds to `z`.
     arriving_occupancy: Tensor,
     arriving_semantics: Tensor,
 }

@@ -1,16 +1,21 @@
 //! The networks as a belief update.
 //!
-//! Observations go through sigma_o. Pushes go through sigma_m where its weights are there; where they are not, the
-//! classical rule predicts them, on the belief that sigma_o made.
+//! Observations go through sigma_o, pushes through sigma_m. A [`Cnabu`] of sigma_o alone is for training and for scoring
+//! observations; asked for a push, it predicts by the classical rule.
+//!
+//! libtorch computes on the thread that asks (`cnabu::compute_beside_rayon`): what can be done side by side is split over
+//! rayon's threads, each with networks of its own. So nothing waits at OpenMP's barriers, where threads spin and a decision
+//! beside other work takes ten times as long; and no sum depends on the number of threads.
 
 use super::layout::{LABELS, Layout, Mirror, OCCUPANCY, SEMANTICS};
-use super::observe_net::{Evidence, ObserveNet};
+use super::observe_net::{Evidence, ObserveNet, mirrored};
 use super::predict::predict;
 use super::push_net::PushNet;
 use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
-use crate::belief::{Belief, BeliefUpdate, Classical, PushPrediction, SweptPush};
+use crate::belief::{Belief, BeliefUpdate, Classical, NetworksUsed, PushPrediction, SweptPush, Weights};
 use crate::camera::MapObservation;
+use crate::files::sha256_of_file;
 use crate::grid::Grid;
 use crate::{Error, Result};
 use std::path::Path;
@@ -21,22 +26,38 @@ use tch::{Device, Kind, Tensor};
 /// sigma_o and sigma_m with their weights; `cnabu` in episodes.
 #[derive(Debug)]
 pub struct Cnabu {
-    // libtorch's tensors may be sent to another thread but not be used by two at once.
-    networks: Mutex<Networks>,
+    pool: Pool,
     card: Card,
+    /// The files that they were read from.
+    weights: Weights,
 }
 
+/// The same networks several times, one for each thread that may ask at once: libtorch's tensors may be sent to another
+/// thread but not be used by two.
 #[derive(Debug)]
-struct Networks {
+pub(super) struct Pool(Vec<Mutex<Networks>>);
+
+#[derive(Debug)]
+pub(super) struct Networks {
     observe: ObserveNet,
     /// sigma_m, and the temperature of its probabilities of change.
-    push: Option<(PushNet, f32)>,
+    pub(super) push: Option<(PushNet, f32)>,
     /// They hold the variables, and say on which device.
     stores: Vec<VarStore>,
 }
 
+impl Pool {
+    /// Networks that no other thread uses now, or the next to be free. Whoever holds them asks nothing of rayon, whose
+    /// thread might take up work that wants them too.
+    pub(super) fn take(&self) -> MutexGuard<'_, Networks> {
+        let free = self.0.iter().find_map(|networks| networks.try_lock().ok());
+        let mine = rayon::current_thread_index().unwrap_or(0) % self.0.len();
+        free.unwrap_or_else(|| self.0[mine].lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
 impl Networks {
-    fn device(&self) -> Device {
+    pub(super) fn device(&self) -> Device {
         self.stores.first().map_or(Device::Cpu, VarStore::device)
     }
 }
@@ -46,11 +67,30 @@ impl Cnabu {
     /// not set, a CUDA device if libtorch has one.
     ///
     /// # Errors
-    /// For weights that are missing (those of sigma_m may), damaged, not finite, or of another grid, class list or version.
+    /// For weights that are missing, damaged, not finite, or of another grid, class list or version.
     pub fn load(directory: &Path) -> Result<Self> {
-        let update = Self::load_file(&directory.join(OBSERVE_WEIGHTS))?;
-        let push = directory.join(PUSH_WEIGHTS);
-        if push.is_file() { update.with_push_file(&push) } else { Ok(update) }
+        let [observe, push] = [OBSERVE_WEIGHTS, PUSH_WEIGHTS].map(|file| directory.join(file));
+        let first = Self::load_file(&observe)?.with_push_file(&push)?;
+        first.for_all_threads(|| Self::read_file(&observe)?.with_push_read(&push))
+    }
+
+    /// Loads sigma_o alone, to score observations.
+    ///
+    /// # Errors
+    /// As [`Cnabu::load`].
+    pub fn load_observation(directory: &Path) -> Result<Self> {
+        let path = directory.join(OBSERVE_WEIGHTS);
+        Self::load_file(&path)?.for_all_threads(|| Self::read_file(&path))
+    }
+
+    /// Networks for each of rayon's threads: these, and what `again` reads.
+    fn for_all_threads(mut self, again: impl Fn() -> Result<Self>) -> Result<Self> {
+        // A graphics card computes for all threads in turn.
+        let copies = if self.device() == Device::Cpu { rayon::current_num_threads() } else { 1 };
+        for _ in 1..copies {
+            self.pool.0.append(&mut again()?.pool.0);
+        }
+        Ok(self)
     }
 
     /// Loads sigma_o from its file.
@@ -58,9 +98,13 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn load_file(path: &Path) -> Result<Self> {
-        if !path.is_file() {
-            return Err(Error::input(path, "", "there are no weights here (nudge train observe makes them)"));
-        }
+        let mut update = Self::read_file(path)?;
+        update.weights.sigma_o = Some(sha256_of_file(path)?);
+        Ok(update)
+    }
+
+    fn read_file(path: &Path) -> Result<Self> {
+        is_there(path, "observe")?;
         let (net, store, card) = load_network::<ObserveNet>(path, super::chosen_device()?)?;
         Ok(Self::of(net, store, card))
     }
@@ -70,19 +114,28 @@ impl Cnabu {
     /// # Errors
     /// As [`Cnabu::load`].
     pub fn with_push_file(self, path: &Path) -> Result<Self> {
+        let mut update = self.with_push_read(path)?;
+        update.weights.sigma_m = Some(sha256_of_file(path)?);
+        Ok(update)
+    }
+
+    fn with_push_read(self, path: &Path) -> Result<Self> {
+        is_there(path, "push")?;
         let (net, store, card) = load_network::<PushNet>(path, self.device())?;
         Ok(self.with_push(net, store, card.change_temperature.unwrap_or(1.0)))
     }
 
     /// A belief update of a sigma_o at hand.
     pub fn of(net: ObserveNet, store: VarStore, card: Card) -> Self {
-        Self { networks: Mutex::new(Networks { observe: net, push: None, stores: vec![store] }), card }
+        let networks = Networks { observe: net, push: None, stores: vec![store] };
+        Self { pool: Pool(vec![Mutex::new(networks)]), card, weights: Weights::default() }
     }
 
     /// The same with a sigma_m at hand, whose log-odds of change are divided by `temperature`.
-    pub fn with_push(self, net: PushNet, store: VarStore, temperature: f32) -> Self {
+    pub fn with_push(mut self, net: PushNet, store: VarStore, temperature: f32) -> Self {
+        self.weights = Weights { sigma_m: None, change_temperature: Some(temperature), ..self.weights };
         {
-            let mut networks = self.networks();
+            let mut networks = self.pool.take();
             networks.push = Some((net, temperature));
             networks.stores.push(store);
         }
@@ -96,11 +149,7 @@ impl Cnabu {
 
     /// The device that the networks are on.
     pub fn device(&self) -> Device {
-        self.networks().device()
-    }
-
-    fn networks(&self) -> MutexGuard<'_, Networks> {
-        self.networks.lock().unwrap_or_else(PoisonError::into_inner)
+        self.pool.take().device()
     }
 
     /// sigma_o on planes: posterior evidence from prior evidence, levels observed and one-hot labels.
@@ -111,14 +160,20 @@ impl Cnabu {
         observed: &Tensor,
         labels: &Tensor,
     ) -> Evidence {
-        let networks = self.networks();
-        let device = networks.device();
-        let forward = if layout.is_padded() { ObserveNet::forward } else { ObserveNet::forward_both_ways };
-        tch::no_grad(|| {
-            let (occupancy, semantics) =
-                forward(&networks.observe, prior, &observed.to_device(device), &labels.to_device(device));
-            Evidence::of_heads(&occupancy, &semantics)
-        })
+        let device = self.device();
+        let planes = [&prior.occupancy, &prior.semantics, observed, labels].map(|planes| planes.to_device(device));
+        let forward = |planes: [Tensor; 4]| {
+            let [occupancy, semantics, observed, labels] = planes;
+            let prior = Evidence { occupancy, semantics };
+            tch::no_grad(|| self.pool.take().observe.forward(&prior, &observed, &labels))
+        };
+        // The shelf and its mirror image side by side: what stands there does not depend on which side is called left, and
+        // where the two answers disagree neither is certain.
+        let mirrored = |planes: &Tensor| mirrored(planes, layout.grid().dims[0] as i64);
+        let turned = planes.each_ref().map(mirrored);
+        let (here, there) = rayon::join(|| forward(planes), || forward(turned));
+        let mean = |here: Tensor, there: Tensor| (here + mirrored(&there)) * 0.5;
+        Evidence::of_heads(&mean(here.0, there.0), &mean(here.1, there.1))
     }
 
     /// A belief's evidence as planes on the networks' device.
@@ -133,6 +188,12 @@ impl Cnabu {
     }
 }
 
+/// Refuses a file of weights that is missing, and names the command that makes it.
+fn is_there(path: &Path, network: &str) -> Result<()> {
+    let missing = || Error::input(path, "", format!("no weights are here (`nudge train {network}` makes them)"));
+    path.is_file().then_some(()).ok_or_else(missing)
+}
+
 /// The belief of planes of evidence's logarithms.
 pub(crate) fn belief_of(layout: &Layout, evidence: &Evidence) -> Belief {
     let values = |logs: &Tensor| {
@@ -143,7 +204,7 @@ pub(crate) fn belief_of(layout: &Layout, evidence: &Evidence) -> Belief {
     layout.belief(&values(&evidence.occupancy), &values(&evidence.semantics))
 }
 
-/// What an observation looks like to sigma_o: levels and labels.
+/// Inputs of sigma_o that describe an observation: levels and labels.
 pub(crate) fn observation_planes(layout: &Layout, observation: &MapObservation, mirror: Mirror) -> (Tensor, Tensor) {
     let plane = layout.plane();
     let (mut observed, mut labels) = (vec![0.0; 2 * OCCUPANCY * plane], vec![0.0; LABELS * plane]);
@@ -162,9 +223,18 @@ impl BeliefUpdate for Cnabu {
         Layout::new(grid).map(|_| ())
     }
 
-    /// sigma_o learned to take in ten looks; by forty its map of what is seen has worn (RESULTS.md).
+    /// sigma_o was trained on ten looks; with forty the belief drifts (RESULTS.md).
     fn wears(&self) -> bool {
         true
+    }
+
+    fn networks_used(&self) -> Option<NetworksUsed> {
+        let device = if self.device().is_cuda() { "cuda" } else { "cpu" };
+        Some(NetworksUsed {
+            weights: self.weights.clone(),
+            libtorch: env!("NUDGE_LIBTORCH").to_owned(),
+            device: device.to_owned(),
+        })
     }
 
     /// A grid of other voxels than the networks' ([`BeliefUpdate::check_grid`] refuses it) is updated classically.
@@ -177,13 +247,106 @@ impl BeliefUpdate for Cnabu {
 
     fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
         let Ok(layout) = Layout::new(&belief.grid) else { return Classical.predict_pushes(belief, pushes) };
-        let prior = self.planes_of(&layout, belief);
-        let networks = self.networks();
-        match &networks.push {
-            Some((net, temperature)) => {
-                tch::no_grad(|| predict(net, *temperature, &layout, &prior, belief, pushes, networks.device()))
+        predict(&self.pool, &layout, &self.planes_of(&layout, belief), belief, pushes)
+            .unwrap_or_else(|| Classical.predict_pushes(belief, pushes))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::UNOBSERVED;
+    use crate::cnabu::Network;
+    use crate::grid::VoxelSet;
+    use crate::rng;
+    use crate::scene::CLASS_COUNT;
+    use rand::Rng;
+
+    /// The floor cell that is as far from the right as `cell` is from the left.
+    fn opposite(grid: &Grid, cell: usize) -> usize {
+        let [width, depth, _] = grid.dims;
+        (width - 1 - cell / depth) * depth + cell % depth
+    }
+
+    fn mirrored_set(grid: &Grid, set: &VoxelSet) -> VoxelSet {
+        let (mut mirrored, height) = (VoxelSet::empty(grid), grid.dims[2]);
+        set.iter().for_each(|voxel| mirrored.insert(opposite(grid, voxel / height) * height + voxel % height));
+        mirrored
+    }
+
+    fn mirrored_observation(grid: &Grid, of: &MapObservation) -> MapObservation {
+        let labels = (0..grid.cell_count()).map(|cell| of.labels[opposite(grid, cell)]).collect();
+        MapObservation { free: mirrored_set(grid, &of.free), occupied: mirrored_set(grid, &of.occupied), labels }
+    }
+
+    fn mirrored_belief(of: &Belief) -> Belief {
+        let mut mirrored = of.clone();
+        for cell in 0..of.grid.cell_count() {
+            let from = opposite(&of.grid, cell);
+            mirrored.semantics[cell] = of.semantics[from];
+            mirrored.occupancy[of.grid.column(cell)].copy_from_slice(&of.occupancy[of.grid.column(from)]);
+        }
+        mirrored
+    }
+
+    /// A belief and an observation without any symmetry.
+    fn scene(grid: Grid) -> (Belief, MapObservation) {
+        let mut rng = rng::stream(5, "mirror test", 0);
+        let mut belief = Belief::uniform(grid);
+        let mut observation = MapObservation {
+            free: VoxelSet::empty(&grid),
+            occupied: VoxelSet::empty(&grid),
+            labels: vec![UNOBSERVED; grid.cell_count()],
+        };
+        for cell in 0..grid.cell_count() {
+            belief.semantics[cell] = std::array::from_fn(|_| 1.0 + 9.0 * rng.random::<f32>());
+            if rng.random::<bool>() {
+                observation.labels[cell] = rng.random_range(0..CLASS_COUNT as u8);
             }
-            None => Classical.predict_pushes(belief, pushes),
+            for voxel in grid.column(cell) {
+                belief.occupancy[voxel] = std::array::from_fn(|_| 1.0 + 9.0 * rng.random::<f32>());
+                match rng.random_range(0..3) {
+                    0 => observation.free.insert(voxel),
+                    1 => observation.occupied.insert(voxel),
+                    _ => (),
+                }
+            }
+        }
+        (belief, observation)
+    }
+
+    /// The largest difference between the means of two beliefs.
+    fn far(a: &Belief, b: &Belief) -> f32 {
+        let voxels = (0..a.occupancy.len()).map(|voxel| (a.probability(voxel) - b.probability(voxel)).abs());
+        let cells = a.semantics.iter().zip(&b.semantics).flat_map(|(a, b)| {
+            let sums = [a, b].map(|classes| classes.iter().sum::<f32>());
+            (0..CLASS_COUNT).map(move |class| (a[class] / sums[0] - b[class] / sums[1]).abs())
+        });
+        voxels.chain(cells).fold(0.0, f32::max)
+    }
+
+    /// Shelves whose planes need padding lost the second opinion of the mirror image, without a word.
+    #[test]
+    fn a_mirrored_shelf_gets_the_mirrored_posterior_padded_or_not() {
+        tch::manual_seed(3);
+        let store = VarStore::new(Device::Cpu);
+        let net = ObserveNet::new(&store.root(), 8);
+        let update = Cnabu::of(net, store, Card::new("sigma_o", 8, 0));
+        // No padding; padding along x with an even and with an odd number of floor cells; padding along y alone.
+        for (size, padded) in [
+            ([0.16, 0.08, 0.10], false),
+            ([0.13, 0.08, 0.10], true),
+            ([0.135, 0.07, 0.08], true),
+            ([0.16, 0.06, 0.10], true),
+        ] {
+            let grid = Grid::for_shelf(size, 0.005);
+            assert_eq!(Layout::new(&grid).expect("5 mm").is_padded(), padded, "{size:?}");
+            let (belief, observation) = scene(grid);
+            let here = update.observe(&belief, &observation);
+            let there = update.observe(&mirrored_belief(&belief), &mirrored_observation(&grid, &observation));
+            let off = far(&mirrored_belief(&here), &there);
+            assert!(off < 1e-4, "{size:?}: {off}");
+            assert!(far(&here, &there) > 1e-2, "the scene has no symmetry");
         }
     }
 }

@@ -112,7 +112,7 @@ impl Card {
         Ok(card)
     }
 
-    /// Updates that the weights have behind them, as far as the card tells.
+    /// Number of updates that the weights were trained for, according to the card.
     pub fn updates(&self) -> u64 {
         self.training.get(UPDATES).and_then(|updates| updates.parse().ok()).unwrap_or(0)
     }

@@ -7,9 +7,9 @@
 //! episode.rrd, summary.png, notes.json      written by others, removed with the episode they belong to
 //! ```
 //!
-//! Every file is there whole or not at all, and `episode.json` is renamed last: what it tells of is there. A run that
-//! is killed at any moment leaves a directory that opens and resumes, or, before its first `episode.json`, one that a
-//! new run may start in.
+//! Every file is there whole or not at all, and `episode.json` is renamed last: everything that it names is there. A
+//! run that is killed at any moment leaves a directory that opens and resumes, or, before its first `episode.json`, one
+//! that a new run may start in.
 
 use super::machine::Episode;
 use super::npz::{self, Precision, StoredTruth};
@@ -65,7 +65,7 @@ pub struct EpisodeDir {
 }
 
 impl EpisodeDir {
-    /// What `path` holds.
+    /// What `path` contains.
     pub fn state(path: impl AsRef<Path>) -> Result<DirectoryState> {
         let path = path.as_ref();
         if path.exists() && !path.is_dir() {
@@ -147,7 +147,7 @@ impl EpisodeDir {
         Ok(directory)
     }
 
-    /// Keeps beliefs with the given precision; float16 unless told.
+    /// Keeps beliefs with the given precision; the default is float16.
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;
         self
@@ -172,7 +172,7 @@ impl EpisodeDir {
         Ok(directory)
     }
 
-    /// Opens an episode to go on writing: no other run may be writing it. Files beyond the last step told of in
+    /// Opens an episode to continue writing: no other run may be writing it. Files beyond the last step in
     /// `episode.json` are removed.
     pub(super) fn open_to_write(path: &Path) -> Result<Self> {
         let mut directory = Self::open(path)?;

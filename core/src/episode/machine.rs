@@ -8,8 +8,9 @@ use crate::arm::{Arm, ArmTool, HandPose, Motion, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, SweptPush, look};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet};
+use crate::made_by::{Build, MadeBy};
 use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
-use crate::push::ArmClearance;
+use crate::push::{ArmClearance, Candidate, Counterfactual};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::score::{Scores, object_verdicts};
@@ -73,9 +74,12 @@ impl Episode {
         let grid = scene.grid();
         let belief = Arc::new(Belief::uniform(grid));
         let truth = Arc::new(TruthMap::of(&grid, &bodies));
+        let threads = rayon::current_num_threads();
         let record = EpisodeRecord {
             format: FORMAT,
             version: crate::VERSION.to_owned(),
+            made_by: Some(MadeBy::new(Build::default(), update.networks_used(), config.planner, threads)),
+            also_made_by: Vec::new(),
             scene,
             config,
             prior: Scores::of(&belief, &truth),
@@ -100,6 +104,14 @@ impl Episode {
         })
     }
 
+    /// Names the build of the program that makes the steps to come; to be called once, after [`Episode::new`] or
+    /// [`resume`](super::resume), before the first action.
+    pub fn built_from(&mut self, build: Build) {
+        let threads = rayon::current_num_threads();
+        let planner = self.record.config.planner;
+        self.record.go_on_with(MadeBy::new(build, self.update.networks_used(), planner, threads));
+    }
+
     /// What the policy would do now, and what it weighed. Changes nothing; the same state decides the same.
     pub fn decide(&self) -> Decision {
         let started = Instant::now();
@@ -110,6 +122,7 @@ impl Episode {
             }
             None => (*self.belief).clone(),
         };
+        let really_push = |motions: &[PushMotion]| self.counterfactual().of_each(motions, &|| ());
         let situation = Situation {
             belief: &self.belief,
             update: &*self.update,
@@ -121,6 +134,7 @@ impl Episode {
             budget: self.record.config.budget,
             seed: self.record.config.seed,
             really_look: &really_look,
+            really_push: &really_push,
         };
         let decision = plan::decide(self.record.config.policy, &self.record.config.planner, &situation);
         self.deciding.set(started.elapsed().as_secs_f64());
@@ -263,19 +277,20 @@ impl Episode {
     }
 
     /// `class#id`.
-    fn name(&self, id: ObjectId) -> String {
+    pub(crate) fn name(&self, id: ObjectId) -> String {
         let object = self.record.scene.objects.get(usize::from(id.0));
         format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
     }
 
-    /// The prediction that becomes the belief after a push: for a policy that predicts its pushes, and for a person's.
+    /// The prediction that becomes the belief after a push, for policies that predict pushes and for pushes that a
+    /// person chose; `None` for the other policies.
     fn predict(&self, swept: &SweptPush, reason: Reason) -> Option<PushPrediction> {
         (self.record.config.policy.predicts_pushes() || reason == Reason::Manual)
             .then(|| self.update.predict_pushes(&self.belief, std::slice::from_ref(swept)).pop())
             .flatten()
     }
 
-    /// What a view sees now, noise included: an oracle that asks sees what it will get.
+    /// What a view sees now, noise included: the oracle sees the very image that a look would give.
     fn observe(&self, view: &View) -> (Image, MapObservation) {
         let (shelf, intrinsics) = (self.world.shelf(), &self.views.intrinsics);
         let noise = self.record.config.noise.unwrap_or(NoiseModel::OFF);
@@ -325,7 +340,7 @@ impl Episode {
         self.record = logged;
     }
 
-    /// Takes prior or last step of a log, with what is filed of belief and truth, in place of what repeating them led to.
+    /// Replaces the repeated prior or last step by the one of a log, with belief and truth from the files.
     pub(super) fn adopt_state(&mut self, logged: &EpisodeRecord, belief: Belief, truth: StoredTruth) {
         self.record.prior = logged.prior;
         if let Some(step) = self.record.steps.last_mut() {
@@ -346,8 +361,8 @@ impl Episode {
         self.record.steps.len() >= self.record.config.budget
     }
 
-    /// The voxels that do not count as a gain, when only unseen ones do: those that looks have seen and that no push may
-    /// have changed since.
+    /// The voxels that do not count as a gain, where only unseen ones do: those that looks have seen and that no push
+    /// has probably changed since.
     pub fn seen(&self) -> Option<&VoxelSet> {
         (self.record.config.planner.counted == Counted::Unseen).then_some(self.sightings.seen())
     }
@@ -413,6 +428,18 @@ impl Episode {
     /// The catalogue.
     pub fn catalog(&self) -> &Catalog {
         &self.catalog
+    }
+
+    /// The world as it stands, for telling what pushes would really do.
+    pub fn counterfactual(&self) -> Counterfactual<'_> {
+        Counterfactual::new(&self.world, &self.arm, &self.views, self.sightings.seen())
+    }
+
+    /// The push candidates that a decision to be made now draws, whatever the policy makes of them.
+    pub fn draw_pushes(&self) -> Vec<Candidate> {
+        let config = &self.record.config;
+        let actions = self.history.actions.len();
+        plan::draw_pushes(&config.planner, &self.belief, self.seen(), &self.arm, config.seed, actions)
     }
 
     /// How the belief changes.

@@ -1,8 +1,9 @@
 //! What is kept of an episode: its configuration, its steps, and `episode.json` as a whole.
 
 use crate::arm::Motion;
-use crate::belief::{PushPrediction, SweptPush};
+use crate::belief::{BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{Image, MapObservation, NoiseModel};
+use crate::made_by::MadeBy;
 use crate::plan::{Action, Decision, PlannerSettings, PolicyKind};
 use crate::scene::Scene;
 use crate::score::{ObjectVerdict, Scores};
@@ -103,6 +104,15 @@ pub struct LinkTouch {
     pub object: String,
 }
 
+/// A program that went on with an episode of another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LaterMaker {
+    /// The first step that it made.
+    pub from_step: usize,
+    /// The program.
+    pub made_by: MadeBy,
+}
+
 /// `episode.json`, and what `nudge run --json` prints.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeRecord {
@@ -110,6 +120,12 @@ pub struct EpisodeRecord {
     pub format: u32,
     /// Version of the program that wrote it.
     pub version: String,
+    /// What made it; not there in episodes of programs that did not tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made_by: Option<MadeBy>,
+    /// What made its later steps, where other programs went on with it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub also_made_by: Vec<LaterMaker>,
     /// The scene, embedded with its meshes.
     pub scene: Scene,
     /// Policy, belief, seed, budget, views and planner settings.
@@ -122,6 +138,24 @@ pub struct EpisodeRecord {
 }
 
 impl EpisodeRecord {
+    /// What keeps this program from repeating the episode: weights of other hashes than those it was made with, in words.
+    /// `None` where they are the same, and where the episode does not tell.
+    pub fn other_weights(&self, update: &dyn BeliefUpdate) -> Option<String> {
+        let before = self.made_by.as_ref()?.weights.clone().unwrap_or_default();
+        let now = update.networks_used().map(|used| used.weights).unwrap_or_default();
+        Some(now.differences(&before).join(", ")).filter(|words| !words.is_empty())
+    }
+
+    /// Notes what makes the steps to come, if there are any.
+    pub(super) fn go_on_with(&mut self, maker: MadeBy) {
+        let last = self.also_made_by.last().map(|later| &later.made_by).or(self.made_by.as_ref());
+        if self.steps.is_empty() {
+            self.made_by = Some(maker);
+        } else if self.steps.len() < self.config.budget && !last.is_some_and(|last| maker.is_same_maker(last)) {
+            self.also_made_by.push(LaterMaker { from_step: self.steps.len() + 1, made_by: maker });
+        }
+    }
+
     /// The numbers of actions after which there is a truth: 0 and every push.
     pub fn truth_indices(&self) -> impl Iterator<Item = usize> + '_ {
         let pushes = self.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).map(|step| step.index);

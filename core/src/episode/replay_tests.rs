@@ -3,7 +3,9 @@ use super::super::synthetic;
 use super::super::{Overwrite, Precision};
 use super::super::{resume, review};
 use super::*;
-use crate::belief::{Belief, Classical};
+use crate::belief::{Belief, Classical, NetworksUsed, PushPrediction, SweptPush, Weights};
+use crate::camera::MapObservation;
+use crate::made_by::Build;
 use crate::plan::{Action, PolicyKind};
 use std::fs;
 use std::path::Path;
@@ -217,6 +219,80 @@ fn names_of(path: &Path) -> Vec<String> {
     let mut names = crate::files::names_in(path).expect("listed");
     names.sort();
     names
+}
+
+/// The classical update, as if it ran on weights of which the hash is one digit over and over.
+struct Weighted(&'static str);
+
+impl BeliefUpdate for Weighted {
+    fn name(&self) -> &str {
+        CLASSICAL
+    }
+
+    fn networks_used(&self) -> Option<NetworksUsed> {
+        let weights = Weights { sigma_o: Some(self.0.repeat(64)), ..Weights::default() };
+        Some(NetworksUsed { weights, libtorch: "1".to_owned(), device: "cpu".to_owned() })
+    }
+
+    fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief {
+        Classical.observe(belief, observation)
+    }
+
+    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+        Classical.predict_pushes(belief, pushes)
+    }
+}
+
+#[test]
+fn an_episode_of_other_weights_is_not_resumed_and_says_which() {
+    let root = tempdir().expect("a temporary directory");
+    let path = root.path().join("episode");
+    let (scene, config) = (synthetic::cluttered_scene(), synthetic::config(PolicyKind::RandomPush5, BUDGET));
+    let catalog = Arc::new(Catalog::standard());
+    let mut episode = Episode::new(scene, catalog.clone(), config, Arc::new(Weighted("a"))).expect("an episode");
+    let mut directory = EpisodeDir::create(&path, Overwrite::Refuse).expect("created");
+    directory.write(&mut episode).expect("written");
+    go_on(&mut episode, &mut directory, 2);
+    drop(directory);
+    let resumed = |digit: &'static str| resume(&path, catalog.clone(), Arc::new(Weighted(digit)), &mut |_, _| Ok(()));
+    let error = resumed("e").err().expect("refused");
+    let words = "cannot be resumed: the weights sigma_o were aaaaaaaaaaaa, now they are eeeeeeeeeeee";
+    assert!(error.to_string().contains(words) && error.exit_code() == 2, "{error}");
+    drop(resumed("a").expect("the same weights"));
+    // It is still to be looked at, and one that does not tell its weights is verified by its beliefs alone.
+    let record = EpisodeDir::open(&path).expect("opens").record().expect("a record");
+    assert!(record.other_weights(&Weighted("e")).is_some() && record.other_weights(&Weighted("a")).is_none());
+    let (_, difference) = review(&path, catalog.clone(), None, &mut |_, _| Ok(())).expect("reviewed");
+    assert_eq!(difference, None);
+    let old = EpisodeRecord { made_by: None, ..record };
+    assert!(old.other_weights(&Weighted("e")).is_none());
+    fs::write(path.join("episode.json"), old.to_json()).expect("written");
+    drop(resumed("e").expect("nothing says that they are others"));
+}
+
+#[test]
+fn a_step_says_which_program_made_it() {
+    let root = tempdir().expect("a temporary directory");
+    let path = root.path().join("episode");
+    let build = |letter: &str| Build { commit: letter.repeat(40), dirty: Some(false) };
+    let mut episode = synthetic::episode(PolicyKind::Random, 4);
+    episode.built_from(build("a"));
+    let mut directory = EpisodeDir::create(&path, Overwrite::Refuse).expect("created");
+    directory.write(&mut episode).expect("written");
+    go_on(&mut episode, &mut directory, 1);
+    drop(directory);
+    for (letter, steps) in [("a", 1), ("b", 1), ("b", 1), ("c", 0)] {
+        let (mut directory, mut episode) =
+            resume(&path, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |_, _| Ok(())).expect("resumes");
+        episode.built_from(build(letter));
+        go_on(&mut episode, &mut directory, steps);
+    }
+    let record = EpisodeDir::open(&path).expect("opens").record().expect("a record");
+    let commit = |made_by: &crate::made_by::MadeBy| made_by.commit[..1].to_owned();
+    assert_eq!(record.made_by.as_ref().map(commit).as_deref(), Some("a"));
+    let later: Vec<(usize, String)> =
+        record.also_made_by.iter().map(|later| (later.from_step, commit(&later.made_by))).collect();
+    assert_eq!(later, [(3, "b".to_owned())], "each other program once, and none that did nothing");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Opening an episode again: to go on with a run that was stopped, or to look at it.
+//! Opening an episode again: to continue a run that was stopped, or to look at it.
 
 use super::directory::EpisodeDir;
 use super::machine::Episode;
@@ -11,16 +11,17 @@ use crate::{Error, Result};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Is shown an episode on its way, with what the last action brought.
+/// Called for every state of an episode that is opened, with the outcome of the last action.
 pub type Observer<'a> = &'a mut dyn FnMut(&Episode, Option<&StepOutcome>) -> Result<()>;
 
-/// Opens the episode in `path` to go on with it: repeats the actions of its log without deciding anew, and verifies
-/// after every one that belief, truth and scores are those in the directory, the beliefs bit for bit. `observer` is shown
-/// the prior (without an outcome) and every action once it is verified, so that a recording can be made anew.
+/// Opens the episode in `path` to continue it: repeats the actions of its log without deciding anew, and verifies after
+/// every one that belief, truth and scores are those in the directory, the beliefs bit for bit. `observer` is called
+/// for the prior (without an outcome) and for every action once it is verified, so that a recording can be made anew.
 ///
 /// # Errors
 /// [`Error::Input`] or [`Error::Io`] for a directory that holds no episode or a damaged one, [`Error::Check`] when the
 /// repeated actions do not lead where the log says (written by another version, or on another machine).
+/// [`Error::Input`], too, for an update of other weights than those that made the episode; it names them.
 pub fn resume(
     path: impl AsRef<Path>,
     catalog: Arc<Catalog>,
@@ -28,7 +29,10 @@ pub fn resume(
     observer: Observer<'_>,
 ) -> Result<(EpisodeDir, Episode)> {
     let directory = EpisodeDir::open_to_write(path.as_ref())?;
-    let (episode, _) = retrace(&directory, catalog, update, Departure::Refused, observer)?;
+    if let Some(words) = directory.record()?.other_weights(&*update) {
+        return Err(Error::input(directory.path(), "", format!("cannot be resumed: {words}")));
+    }
+    let (episode, _) = retrace(&directory, catalog, update, Departure::Refused, usize::MAX, observer)?;
     Ok((directory, episode))
 }
 
@@ -36,7 +40,8 @@ pub fn resume(
 /// the log says (it was written by another version, or on another machine), the filed step, belief and truth stand in
 /// place of the repeated ones, and the first such place is told beside the episode. Bodies and images remain the
 /// repeated ones. Without an update everything is as it is filed, nothing is compared, pushes have no predictions, and
-/// after a push no voxel counts as seen.
+/// after a push no voxel counts as seen: so an episode is to be opened whose update is not here, or here with other weights
+/// ([`EpisodeRecord::other_weights`]).
 ///
 /// # Errors
 /// Those of [`resume`] but for [`Error::Check`], and [`Error::Usage`] for an action of the log that cannot be repeated.
@@ -48,15 +53,29 @@ pub fn review(
 ) -> Result<(Episode, Option<Difference>)> {
     let directory = EpisodeDir::open(path.as_ref())?;
     match update {
-        Some(update) => retrace(&directory, catalog, update, Departure::Overruled, observer),
+        Some(update) => retrace(&directory, catalog, update, Departure::Overruled, usize::MAX, observer),
         None => {
             let update = Arc::new(Absent(directory.record()?.config.belief));
-            retrace(&directory, catalog, update, Departure::Expected, observer)
+            retrace(&directory, catalog, update, Departure::Expected, usize::MAX, observer)
         }
     }
 }
 
-/// Stands for the update that a log names where there is none: leaves every belief as it is.
+/// Goes through the first `actions` actions of an episode as [`review`] does: `observer` is shown the prior and every action.
+///
+/// # Errors
+/// Those of [`review`].
+pub(crate) fn revisit(
+    directory: &EpisodeDir,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    actions: usize,
+    observer: Observer<'_>,
+) -> Result<Option<Difference>> {
+    Ok(retrace(directory, catalog, update, Departure::Overruled, actions, observer)?.1)
+}
+
+/// Placeholder for an update that the log names and this program lacks: leaves every belief as it is.
 struct Absent(String);
 
 impl BeliefUpdate for Absent {
@@ -78,23 +97,25 @@ impl BeliefUpdate for Absent {
 enum Departure {
     /// End with an error.
     Refused,
-    /// Go on from what is filed, and tell where it began.
+    /// Continue from the files, and report where the difference began.
     Overruled,
-    /// Go on from what is filed after every action, comparing nothing.
+    /// Continue from the files after every action, comparing nothing.
     Expected,
 }
 
+/// Repeats at most `actions` actions of a log.
 fn retrace(
     directory: &EpisodeDir,
     catalog: Arc<Catalog>,
     update: Arc<dyn BeliefUpdate>,
     departure: Departure,
+    actions: usize,
     observer: Observer<'_>,
 ) -> Result<(Episode, Option<Difference>)> {
     let logged = directory.record()?;
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
     let mut first = None;
-    for done in 0..=logged.steps.len() {
+    for done in 0..=logged.steps.len().min(actions) {
         let step = done.checked_sub(1).map(|at| &logged.steps[at]);
         let mut outcome = step.map(|step| episode.act(step.decision.clone())).transpose()?;
         let difference = match departure {
@@ -114,11 +135,13 @@ fn retrace(
         first = first.or(difference);
         observer(&episode, outcome.as_ref())?;
     }
-    episode.adopt_log(logged);
+    if actions >= logged.steps.len() {
+        episode.adopt_log(logged);
+    }
     Ok((episode, first))
 }
 
-/// The first place where the episode after `done` actions is not what is filed.
+/// The first place where the episode after `done` actions differs from the files.
 fn difference(
     directory: &EpisodeDir,
     logged: &EpisodeRecord,

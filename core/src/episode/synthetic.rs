@@ -6,6 +6,7 @@ use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, StepRecord, StepSecond
 use crate::arm::Push;
 use crate::belief::{Belief, Classical};
 use crate::camera::ViewId;
+use crate::made_by::{Build, MadeBy};
 use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
 use crate::push::{Rejection, Stage};
 use crate::rng;
@@ -85,6 +86,8 @@ pub fn record(steps: usize) -> EpisodeRecord {
     EpisodeRecord {
         format: FORMAT,
         version: crate::VERSION.to_owned(),
+        made_by: Some(MadeBy::new(Build::default(), None, PlannerSettings::default(), 1)),
+        also_made_by: Vec::new(),
         scene: scene(),
         config: EpisodeConfig {
             policy: PolicyKind::RandomPush5Blind,

@@ -1,12 +1,13 @@
-//! What views cover: each voxel counted once, however many rays meet it.
+//! Gain by coverage: each voxel counts once, however many rays of a view meet it.
 //!
-//! `IG(v) = sum_b U_b T_b(v)` over cubes `b` of [`CELL_M`], about as far apart as a view's rays are: `U_b` is the entropy of
-//! the voxels in it that no look has seen, and `T_b(v)` the largest transmittance with which any ray of the view arrives at
-//! one of them. Two views together have `sum_b U_b max(T_b(v), T_b(w))`, a facility-location function: monotone and
-//! submodular, so that the greedy choice is within 1 - 1/e of the best.
+//! `IG(v) = sum_b U_b T_b(v)` over cubes `b` of edge [`CELL_M`], about the distance between neighbouring rays of a
+//! view: `U_b` is the entropy of the voxels in it that no look has seen, and `T_b(v)` the largest transmittance with
+//! which any ray of the view arrives at one of them. Two views together have `sum_b U_b max(T_b(v), T_b(w))`, a
+//! facility-location function: monotone and submodular, so that the greedy choice is within 1 - 1/e of the best.
 //!
-//! Summed over rays ([`super::gain_of_views`]) a voxel counts once for every ray that meets it, so that what is near counts
-//! many times. After one or more looks that order of the views has little to do with what real looks tell (RESULTS.md).
+//! Summed over rays ([`super::gain_of_views`]) a voxel counts once for every ray that meets it, so near voxels count
+//! many times. After the first look, the order of views by that sum agrees with what real looks bring no better than
+//! chance (RESULTS.md).
 
 use super::pair::ViewPair;
 use super::ray::{Camera, Tally};
@@ -17,7 +18,7 @@ use rayon::prelude::*;
 /// Edge of the cubes that are counted as one, m.
 pub const CELL_M: f32 = 0.015;
 
-/// What each of some views covers under one field.
+/// The cubes that each of some views covers under one field.
 pub struct Coverage<'a> {
     field: &'a GainField,
     /// Number of the cell by position in the padded grid: 0 where it holds nothing unseen, and outside.

@@ -5,6 +5,7 @@ use super::{RayDensity, arrivals, skip};
 use crate::belief::{Belief, PushPrediction, beta_mean};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet, Window};
+use crate::world::TruthMap;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -45,18 +46,34 @@ impl GainField {
         Self { layout, codes, seen: None }
     }
 
+    /// A true map, every voxel free or filled, without skip levels as [flat](Self::flat).
+    ///
+    /// # Panics
+    /// If the grid has more than 2,000 voxels along an axis.
+    pub(super) fn of_truth(grid: &Grid, truth: &TruthMap) -> Self {
+        let layout = Layout::of(grid);
+        let mut codes = vec![OPAQUE; layout.len()];
+        for (cell, filled) in truth.occupancy.chunks_exact(grid.dims[2]).enumerate() {
+            let column = layout.column(cell);
+            for (code, filled) in codes[column..].iter_mut().zip(filled) {
+                *code = if *filled == 0 { 0 } else { OPAQUE };
+            }
+        }
+        Self { layout, codes, seen: None }
+    }
+
     /// The grid of the belief.
     pub fn grid(&self) -> &Grid {
         &self.layout.grid
     }
 
-    /// This field with a push's predicted window in place of what stands there. Voxels that were seen inform no more
-    /// after the push than before: what it makes uncertain of them, looking again only restores.
+    /// This field with a push's predicted window in place of what stands there. Voxels that were seen do not count
+    /// after the push either: looking at them again would only restore what the push made uncertain.
     pub fn with_prediction(&self, prediction: &PushPrediction) -> Self {
         self.patched(prediction).0
     }
 
-    /// This field where the given voxels still block but no longer inform (a view saw them).
+    /// This field where the given voxels still block rays but no longer count as a gain (a view saw them).
     pub fn with_seen(&self, seen: &VoxelSet) -> Self {
         let mut arrival = vec![0.0; self.codes.len()];
         for index in seen.iter() {
@@ -86,7 +103,7 @@ impl GainField {
         Self { layout: self.layout, codes: self.codes.clone(), seen: Some(Arc::new(arrival)) }
     }
 
-    /// Whether it tells seen voxels from others, as [`GainField::with_seen`] makes it.
+    /// Whether it distinguishes seen voxels, as made by [`GainField::with_seen`].
     pub fn knows_seen(&self) -> bool {
         self.seen.is_some()
     }

@@ -1,14 +1,14 @@
 //! What pushes open: what can be seen after a push, from anywhere, that could not be seen before.
 //!
-//! A push is not worth it for the one look that follows: what was in view before can be looked at without it. It is worth
-//! it for the space that it opens to all views together, each voxel counted once:
-//! `sum_k H(p'_k) max(0, V'_k - max(V_k, S_k))` over voxels `k`, where `p'` is the predicted belief, `V_k` and `V'_k` tell
-//! whether any ray of any view reaches the voxel before and after the push, and `S_k` whether a look has seen it or it is
-//! believed to be free (`p < 0.05`): what a push makes uncertain of those is no gain.
+//! A push is not judged by the one look that follows: what was in view before can be looked at without it. It is worth
+//! the space that it opens to all views together, each voxel counted once: `sum_k H(p'_k) max(0, V'_k - max(V_k, S_k))`
+//! over voxels `k`, where `p'` is the predicted belief, `V_k` and `V'_k` tell whether any ray of any view reaches the
+//! voxel before and after the push, and `S_k` whether a look has seen it or it is believed to be free (`p < 0.05`):
+//! making those uncertain is no gain.
 //!
-//! A ray is taken to pass where the likeliest map is free (`p < 0.5`). Under the expected transmittance of
-//! [`super::gain_of_views`] a chamber that nobody has looked into closes itself after a few voxels of `p = 0.3`, so that
-//! opening it promises the same whether it is deep or shallow.
+//! A ray passes where the most likely map is free (`p < 0.5`). Under the expected transmittance of
+//! [`super::gain_of_views`] an unseen chamber would block every ray after a few voxels of `p = 0.3`, so that opening it
+//! would be worth the same whether it is deep or shallow.
 
 use super::RayDensity;
 use super::code::{LIKELIEST, Matter};
@@ -79,21 +79,40 @@ impl Openings {
         predictions.par_iter().with_min_len(MIN_TOGETHER).map_init(scratch, of).collect()
     }
 
+    /// Where what a push opens comes from: voxel positions and their nats, in ascending order of position.
+    pub fn per_voxel(&self, prediction: &PushPrediction) -> Vec<(usize, f32)> {
+        let (mut field, mut opened) = (self.field.clone(), Opened::beyond(&self.open));
+        field.overwrite(prediction);
+        self.walk(&field, &mut opened);
+        let nats = |voxel: usize| {
+            let at = field.layout.padded(voxel);
+            let more = if opened.opened[at] > 0.0 { opened.opened[at] - self.open[at] } else { 0.0 };
+            more * LIKELIEST[usize::from(field.codes[at])].information
+        };
+        let voxels = (0..field.grid().voxel_count()).map(|voxel| (voxel, nats(voxel)));
+        voxels.filter(|(_, nats)| *nats > 0.0).collect()
+    }
+
     /// What a push opens; `field` is a copy of the own one, and is that again afterwards.
     fn under(&self, prediction: &PushPrediction, field: &mut GainField, opened: &mut Opened<'_>) -> f32 {
         field.overwrite(prediction);
+        self.walk(field, opened);
+        field.restore(&self.field, prediction.window);
+        opened.take()
+    }
+
+    /// Walks the rays that are no longer stopped where they were.
+    fn walk(&self, field: &GainField, opened: &mut Opened<'_>) {
         for (stop, ray) in self.stops.iter().zip(&self.rays) {
             if LIKELIEST[usize::from(field.codes[*stop])].pass > 0.0 {
                 ray.walk(field, opened);
             }
         }
-        field.restore(&self.field, prediction.window);
-        opened.take()
     }
 }
 
-/// What looks from some views would tell together, nats, by the same count: each voxel once, where the likeliest map lets
-/// a ray reach it, and only what no look has seen.
+/// The gain of some views together, nats, counted in the same way: each unseen voxel once, if a ray reaches it through
+/// the most likely map.
 pub fn gain_together(field: &GainField, array: &ViewArray, ids: &[ViewId], density: RayDensity) -> f32 {
     let nothing;
     let open = match &field.seen {
@@ -264,7 +283,10 @@ mod tests {
                 .zip(&after.codes)
                 .map(|((now, was), code)| f64::from((now - was).max(0.0) * MATTER[usize::from(*code)].information))
                 .sum();
-            let opened = Openings::new(&field, &array, &ids, density).under_each(&[prediction])[0];
+            let openings = Openings::new(&field, &array, &ids, density);
+            let sources: f64 = openings.per_voxel(&prediction).iter().map(|(_, nats)| f64::from(*nats)).sum();
+            assert!((sources - expected).abs() < 1e-3 * (1.0 + expected), "{sources} by voxel is not {expected}");
+            let opened = openings.under_each(&[prediction])[0];
             assert!((f64::from(opened) - expected).abs() < 1e-4 * (1.0 + expected), "{opened} is not {expected}");
             total += expected;
         }

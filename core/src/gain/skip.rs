@@ -13,7 +13,7 @@ use crate::grid::Window;
 pub(super) const RADII: [u8; LEVELS] = [0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
 /// Number of skip levels.
 pub(super) const LEVELS: usize = 11;
-/// Levels that are told apart where a prediction changed the field: enough, and quick to find.
+/// Levels that are distinguished where a prediction changed the field: enough, and quick to compute.
 pub(super) const LOCAL_LEVELS: usize = 6;
 
 /// Free voxels to the side, by code; 0 for what is not transparent.

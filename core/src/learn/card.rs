@@ -1,4 +1,4 @@
-//! The card of a data directory: everything that its samples follow from.
+//! The card of a data directory: everything that determines its samples.
 
 use super::{Recipe, SAMPLES_PER_SHARD, Stretch, VIEWS};
 use crate::files::write_atomically;
@@ -160,7 +160,7 @@ impl Card {
         write_atomically(&path, text.as_bytes())
     }
 
-    /// Refuses a directory that was begun with other settings; names the first that differs. The count may differ.
+    /// Refuses a directory that was started with other settings; names the first that differs. The count may differ.
     pub fn same_recipe(&self, other: &Self, directory: &Path) -> Result<()> {
         let settings = |card: &Self| {
             [

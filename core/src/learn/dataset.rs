@@ -8,7 +8,7 @@ use crate::{Error, Result};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-/// The samples of a directory that are there and whole.
+/// The samples of a directory whose shards are there and undamaged.
 #[derive(Clone, Debug)]
 pub struct Dataset<S> {
     directory: PathBuf,
@@ -21,7 +21,7 @@ pub struct Dataset<S> {
 
 impl<S: Sample> Dataset<S> {
     /// Opens a directory and verifies every shard's checksum. Shards that are damaged are left out and named in
-    /// [`Dataset::skipped`]; shards that are not made yet are not missed.
+    /// [`Dataset::skipped`]; shards that were not made yet are ignored.
     ///
     /// # Errors
     /// For a directory without a card, of another kind, or without a single whole shard.

@@ -1,4 +1,4 @@
-//! How well a belief update does on held-out scenes, against the number of views.
+//! Scores of a belief update on held-out scenes, against the number of views.
 
 use super::{Dataset, MapSample, PushSample, PushedSample, VIEWS, VIEWS_AFTER, ViewSample};
 use crate::Result;
@@ -9,7 +9,7 @@ use crate::world::TruthMap;
 
 /// Counts after one to [`VIEWS`] views over a set of map samples: entry `v - 1` is after `v` views.
 ///
-/// `progress` is told how many samples are done.
+/// `progress` is called with the number of samples that are done.
 ///
 /// # Errors
 /// When a sample cannot be read.
@@ -45,7 +45,7 @@ pub struct PushTallies {
 /// How well pushes are predicted, over a set of push samples: the belief after a sample's views against the truth after
 /// each of its pushes, on the floor cells that the push changes. `observe` makes the beliefs and `predict` the predictions.
 ///
-/// `progress` is told how many samples are done.
+/// `progress` is called with the number of samples that are done.
 ///
 /// # Errors
 /// When a sample cannot be read.
@@ -92,12 +92,18 @@ fn for_each_push(
 /// (least negative log-likelihood; temperature scaling, Guo et al., "On calibration of modern neural networks", 2017), over
 /// all floor cells that a prediction holds possible to change.
 ///
+/// `progress` is told how many samples are done.
+///
 /// # Errors
 /// When a sample cannot be read.
-pub fn fit_change_temperature(data: &Dataset<PushSample>, update: &dyn BeliefUpdate) -> Result<f64> {
+pub fn fit_change_temperature(
+    data: &Dataset<PushSample>,
+    update: &dyn BeliefUpdate,
+    progress: &mut dyn FnMut(usize),
+) -> Result<f64> {
     let grid = data.grid();
     let mut outcomes = Vec::new();
-    for_each_push(data, update, update, &mut |_| (), &mut |sample, _, pushed, prediction| {
+    for_each_push(data, update, update, progress, &mut |sample, _, pushed, prediction| {
         let changed = sample.changed_by(pushed);
         let cells = prediction.window.cells(&grid).zip(&prediction.change).filter(|(_, p)| **p > 0.0);
         outcomes.extend(cells.map(|(cell, p)| (log_odds(f64::from(*p)), changed[cell])));
@@ -138,7 +144,7 @@ fn best_temperature(outcomes: &[(f64, bool)]) -> f64 {
 /// Counts on the whole map after the first push of every sample: entry `v` is of the belief that was predicted, updated with
 /// `v` views of what the push left.
 ///
-/// `progress` is told how many samples are done.
+/// `progress` is called with the number of samples that are done.
 ///
 /// # Errors
 /// When a sample cannot be read.

@@ -8,7 +8,7 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// How far the making is.
+/// Progress of making samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Samples of this process that are on disk or made.
@@ -19,13 +19,13 @@ pub struct Progress {
     pub of: usize,
 }
 
-/// Makes the samples of `card` that are not there yet in `directory`, as far as their files are among `mine`. A directory that was
-/// begun is gone on with; a larger count extends it.
+/// Makes the samples of `card` that are not there yet in `directory`, as far as their files are among `mine`. An
+/// unfinished directory is continued; a larger count extends it.
 ///
-/// `progress` is told after every sample, from any thread.
+/// `progress` is called after every sample, from any thread.
 ///
 /// # Errors
-/// For a directory that was begun with other settings, and when something cannot be simulated or written.
+/// For a directory that was started with other settings, and when something cannot be simulated or written.
 pub fn make<S: Sample>(
     card: &Card,
     recipe: &Recipe,

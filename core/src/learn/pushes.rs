@@ -4,8 +4,9 @@
 //! Pushes are sampled as the planner samples them, from the classical belief after the sample's views, and carried out
 //! by the arm in copies of the same world. Pushes that drop an object are left out: an episode pushes no more after one.
 //!
-//! sigma_m is asked twice about a push: when it is weighed, with what it is planned to sweep, and when it is done, with
-//! what it really swept. The two differ where the arm was blocked; of such pushes, every other sample has the latter.
+//! sigma_m predicts a push twice: when it is weighed, with the volume that it is planned to sweep, and after it is
+//! done, with the volume that it really swept. The two differ where the arm was blocked; of such pushes, every other
+//! sample has the latter.
 //!
 //! What some views see after the first of a sample's pushes is kept too: sigma_o has to learn how much of a predicted
 //! belief to believe.

@@ -1,6 +1,6 @@
 //! Training the networks.
 //!
-//! The weights that are shown and shipped are a running mean of the trained ones.
+//! The weights that are validated and shipped are a running mean of the trained ones.
 //!
 //! Every random choice of batch `n` comes from the stream `(seed, n)`, and a checkpoint holds weights, running mean, Adam's
 //! moments and counters: a run that is stopped and resumed is the run that was not stopped, bit for bit, on the same number
@@ -44,7 +44,7 @@ pub struct TrainSettings {
     pub batch: usize,
     /// Adam's step size.
     pub learning_rate: f64,
-    /// Most views in a sequence; beyond a sample's own they come again, so that going on looking does no harm.
+    /// Most views in a sequence; beyond a sample's own views they repeat, so that more looks do no harm.
     pub max_views: usize,
     /// Weight of the KL term once it has risen.
     pub kl_weight: f64,
@@ -126,7 +126,7 @@ impl<N: Network> Trainer<N> {
         Ok(Self { settings, layout, net, store, state })
     }
 
-    /// Goes on with the run named `out`.
+    /// Continues the run named `out`.
     ///
     /// # Errors
     /// For a run with other settings (names the first that differs), and a checkpoint that is missing or damaged.
@@ -145,8 +145,8 @@ impl<N: Network> Trainer<N> {
         Ok(trainer)
     }
 
-    /// Begins with weights that are finished: those in the file `weights`, with its card beside it. They count on from the
-    /// updates that they have behind them.
+    /// Begins with weights that are finished: those in the file `weights`, with its card beside it. The count of
+    /// updates continues from the number on the card.
     ///
     /// # Errors
     /// For weights that are missing, damaged, of another network, or of another width than the settings'.

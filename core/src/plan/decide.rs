@@ -1,10 +1,12 @@
 //! From a situation to the next action.
 
 use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
-use super::weigh::{Weighed, random_push, weigh_pushes};
+use super::weigh::{Weighed, random_push, weigh_clairvoyantly, weigh_pushes};
 use super::{Action, Counted, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field, look};
+use crate::belief::Belief;
 use crate::camera::ViewId;
 use crate::gain::{RayDensity, gain_together};
+use crate::push::PushTruth;
 use crate::rng::stream;
 use rand::Rng;
 use rayon::prelude::*;
@@ -40,7 +42,7 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
     let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
     let guard = || push_guard(history, situation.budget, complete(), settings);
     match policy {
-        PolicyKind::Mem => {
+        PolicyKind::Mem | PolicyKind::ClairvoyantPush => {
             if let (Counted::All, true, Some(view)) = (settings.counted, history.just_pushed(), history.view_of_push) {
                 decision.action = Action::Look { view };
                 decision.reason = Reason::ViewOfPush;
@@ -48,6 +50,9 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
                 decision.reason = reason;
             } else if still_closing(history, settings) {
                 decision.reason = Reason::JustPushed;
+            } else if policy == PolicyKind::ClairvoyantPush {
+                let (weighed, truth) = weigh_clairvoyantly(settings, situation, &field);
+                choose_clairvoyantly(&mut decision, weighed, truth.as_ref(), settings, situation.belief);
             } else {
                 let weighed = weigh_pushes(settings, situation, &field);
                 choose(&mut decision, weighed, settings);
@@ -77,20 +82,47 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
 
 /// Applies the rule to what was weighed.
 fn choose(decision: &mut Decision, weighed: Weighed, settings: &PlannerSettings) {
-    decision.candidates = weighed.candidates;
-    decision.best_push = weighed.best;
-    decision.motion = weighed.motion;
-    let Some(best) = weighed.best.map(|at| &decision.candidates[at]) else {
-        decision.reason = Reason::NoCandidate;
-        return;
-    };
+    let Some(best) = take_over(decision, weighed).map(|at| &decision.candidates[at]) else { return };
     decision.igm = best.gain.unwrap_or(0.0);
     decision.reg = best.reg.unwrap_or(0.0);
-    let (looking, floor) = (settings.patience * decision.igv, settings.push_floor);
-    decision.reason = look_or_push(looking, floor, decision.igm, decision.reg, settings.gamma);
+    decision.reason = ruled(decision, settings);
     if decision.reason == Reason::PushTellsMore {
         decision.action = Action::Push(best.push);
     }
+}
+
+/// Pushes if the best push really wins objects; else applies the rule, to what is unknown of the space that it really opens
+/// in place of what it promises. A push that loses more objects than it wins is worth nothing.
+fn choose_clairvoyantly(
+    decision: &mut Decision,
+    weighed: Weighed,
+    truth: Option<&PushTruth>,
+    settings: &PlannerSettings,
+    belief: &Belief,
+) {
+    let (Some(at), Some(truth)) = (take_over(decision, weighed), truth) else { return };
+    decision.igm = if truth.balance() < 0 { 0.0 } else { truth.opened_nats(belief) };
+    decision.reason = if truth.balance() > 0 { Reason::PushReveals } else { ruled(decision, settings) };
+    if matches!(decision.reason, Reason::PushReveals | Reason::PushTellsMore) {
+        decision.action = Action::Push(decision.candidates[at].push);
+    }
+}
+
+/// Takes what was weighed into the decision, and says which push is best; where none is, that is the reason to look.
+fn take_over(decision: &mut Decision, mut weighed: Weighed) -> Option<usize> {
+    decision.motion = weighed.take_motion();
+    decision.candidates = weighed.candidates;
+    decision.best_push = weighed.best;
+    if weighed.best.is_none() {
+        decision.reason = Reason::NoCandidate;
+    }
+    weighed.best
+}
+
+/// The rule, for what the decision holds of looking and of the best push.
+fn ruled(decision: &Decision, settings: &PlannerSettings) -> Reason {
+    let (looking, floor) = (settings.patience * decision.igv, settings.push_floor);
+    look_or_push(looking, floor, decision.igm, decision.reg, settings.gamma)
 }
 
 /// Replaces the look by a random feasible push, if nothing forbids it and there is one.
@@ -99,13 +131,8 @@ fn push_at_random(decision: &mut Decision, situation: &Situation<'_>, guard: Opt
         decision.reason = reason;
         return;
     }
-    let drawn = random_push(situation);
-    decision.candidates = drawn.candidates;
-    decision.best_push = drawn.best;
-    decision.motion = drawn.motion;
-    match drawn.best {
-        Some(at) => decision.action = Action::Push(decision.candidates[at].push),
-        None => decision.reason = Reason::NoCandidate,
+    if let Some(at) = take_over(decision, random_push(situation)) {
+        decision.action = Action::Push(decision.candidates[at].push);
     }
 }
 

@@ -1,12 +1,12 @@
-//! What views are worth: rays or coverage.
+//! The gain of views: by rays or by coverage.
 //!
-//! Where all voxels count, a view gains what its rays meet ([`gain_of_views`], the paper's formula). Where only unseen ones
-//! do, each counts once ([`Coverage`]).
+//! Where all voxels count, a view gains what its rays meet ([`gain_of_views`], the gain that the paper takes from Delmerico
+//! et al. 2018). Where only unseen ones do, each counts once ([`Coverage`]).
 //!
-//! Before the first look a belief knows nothing, and with `p = 0.5` everywhere no ray gets farther than a few voxels: every
-//! view that shows the shelf's front is as good. But things stand on the board, so until something was seen, a voxel without
-//! evidence counts as occupied with [`standing`]'s probability, which falls with its height. The first look then comes from
-//! above, where most can be seen past what stands in front.
+//! Before the first look the belief is `p = 0.5` everywhere, and no ray gets farther than a few voxels: all views that
+//! show the shelf's front are equally good. But objects stand on the board. So until something was seen, a voxel
+//! without evidence has the occupancy probability of [`standing`], which falls with its height. The first look then
+//! comes from above, where the camera sees most past the objects in front.
 
 use crate::belief::Belief;
 use crate::camera::{ViewArray, ViewId};
@@ -15,16 +15,17 @@ use crate::grid::VoxelSet;
 
 /// How probably a voxel right above the board is occupied.
 const ON_BOARD: f32 = 0.5;
-/// Height above the board at which nothing stands any more, m.
+/// Height above the board from which nothing is expected any more, m.
 const TALLEST_M: f32 = 0.25;
 
-/// How probably something stands at a height above the board, before anything was seen: as in shelves of the generator,
-/// where it is 0.5 up to 7 cm, 0.3 at 12 cm, 0.14 at 21 cm and nothing from 25 cm on.
+/// Occupancy probability at a height above the board before anything was seen: as in shelves of the generator, where it
+/// is 0.5 up to 7 cm, 0.3 at 12 cm, 0.14 at 21 cm and nothing from 25 cm on.
 fn standing(height_m: f32) -> f32 {
     ON_BOARD * (1.0 - height_m / TALLEST_M).max(0.0)
 }
 
-/// What rays walk through to tell what views gain under a belief: voxels of `seen` block but do not count.
+/// The field that rays pass through to compute the gain of views under a belief: voxels of `seen` block rays but do not
+/// count.
 pub fn gain_field(belief: &Belief, seen: Option<&VoxelSet>) -> GainField {
     let Some(seen) = seen else { return GainField::new(belief) };
     if !seen.is_empty() {

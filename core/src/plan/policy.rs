@@ -1,4 +1,4 @@
-//! The policies by name, and what each of them stands for.
+//! The policies by name, and what each of them does.
 
 use crate::belief::{CLASSICAL, CNABU};
 use crate::named;
@@ -11,7 +11,7 @@ use std::str::FromStr;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum PolicyKind {
-    /// The rule above.
+    /// Best view or best push, by the rule of [`look_or_push`](super::look_or_push).
     Mem,
     /// Best view, never a push.
     MemNoPush,
@@ -32,11 +32,14 @@ pub enum PolicyKind {
     Saturation,
     /// Clairvoyant: the view whose real observation cuts the entropy most; never a push.
     Oracle,
+    /// Clairvoyant: as [`Self::Mem`], but pushes are carried out in copies of the world beforehand, and the one that really
+    /// brings most objects into sight is made.
+    ClairvoyantPush,
 }
 
 impl PolicyKind {
-    /// Every policy, in the order of the method's table.
-    pub const ALL: [Self; 9] = [
+    /// Every policy, in the order of the table in METHOD.md.
+    pub const ALL: [Self; 10] = [
         Self::Mem,
         Self::MemNoPush,
         Self::RandomCnabu,
@@ -46,6 +49,7 @@ impl PolicyKind {
         Self::RandomViewPush5,
         Self::Saturation,
         Self::Oracle,
+        Self::ClairvoyantPush,
     ];
 
     /// Its name on the command line and in files.
@@ -60,6 +64,7 @@ impl PolicyKind {
             Self::RandomViewPush5 => "random-view-push-5",
             Self::Saturation => "saturation",
             Self::Oracle => "oracle",
+            Self::ClairvoyantPush => "clairvoyant-push",
         }
     }
 

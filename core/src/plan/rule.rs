@@ -2,25 +2,12 @@
 
 use super::{History, PlannerSettings, Reason};
 
-/// The first steps, in which nothing is pushed: the map is still too empty to push by.
-pub const QUIET_STEPS: usize = 3;
-/// Looks that close a push, when all voxels count: after the last push something has to be looked at.
-pub const CLOSING_STEPS: usize = 1;
-/// Looks that close a push, when unseen voxels count.
-pub const RESTORING_STEPS: usize = 4;
-/// How many times what looking promises a push has to promise when unseen voxels count.
-pub const PATIENCE: f32 = 10.0;
-/// What a push has to promise at least when unseen voxels count, nats (RESULTS.md tells what pushes that promise less lead
-/// to).
-pub const PUSH_FLOOR: f32 = 2000.0;
 /// The scheduled policies push at every step whose number, counted from 1, is a multiple of this.
 pub const PUSH_EVERY: usize = 5;
-/// Relative difference of two consecutive best gains below which looking is saturated.
-pub const SATURATION: f32 = 0.02;
 
-/// The rule: look if `max(IGV, floor) > IGM + gamma Reg`, else push. In the paper the floor is 0.
+/// The rule: look if `max(IGV, floor) > IGM + gamma Reg`, else push. The paper's rule has no floor: 0.
 ///
-/// `reg` is at most 0, so a push that blurs what is known of the labels has to promise more.
+/// `reg` is at most 0, so a push that makes labels less certain has to promise more.
 pub fn look_or_push(igv: f32, floor: f32, igm: f32, reg: f32, gamma: f32) -> Reason {
     match igm + gamma * reg {
         push if igv > push => Reason::LookTellsMore,
@@ -29,8 +16,8 @@ pub fn look_or_push(igv: f32, floor: f32, igm: f32, reg: f32, gamma: f32) -> Rea
     }
 }
 
-/// Why no push is allowed in the next step of `budget`, or `None` if one is. Of several reasons the lasting ones are named
-/// first.
+/// Why no push is allowed in the next step of `budget`, or `None` if one is. Of several reasons, those that last are
+/// named first.
 pub fn push_guard(history: &History, budget: usize, map_complete: bool, settings: &PlannerSettings) -> Option<Reason> {
     let step = history.actions.len();
     let guards = [
@@ -43,14 +30,14 @@ pub fn push_guard(history: &History, budget: usize, map_complete: bool, settings
     guards.into_iter().find(|(holds, _)| *holds).map(|(_, reason)| reason)
 }
 
-/// Whether the last push is not closed yet: fewer than [`PlannerSettings::closing_steps`] looks followed it, so that what it
-/// disturbed is not made good and what it opened not seen.
+/// Whether the last push still needs looks: fewer than [`PlannerSettings::closing_steps`] followed it, so the map does
+/// not yet show what it moved and what it opened.
 pub fn still_closing(history: &History, settings: &PlannerSettings) -> bool {
     history.looks_since_push().is_some_and(|looks| looks < settings.closing_steps)
 }
 
 /// Whether looking no longer gets better or worse: two consecutive best gains differ by less than `share` of the larger
-/// one, by default [`SATURATION`].
+/// one ([`PlannerSettings::saturation`]).
 pub fn saturated(previous: f32, current: f32, share: f32) -> bool {
     let larger = previous.max(current);
     larger <= 0.0 || (current - previous).abs() < share * larger
@@ -140,14 +127,9 @@ mod tests {
 
     #[test]
     fn saturation_is_two_percent() {
-        assert!(
-            saturated(100.0, 98.5, SATURATION) && saturated(98.5, 100.0, SATURATION) && saturated(0.0, 0.0, SATURATION)
-        );
+        let share = PlannerSettings::default().saturation;
+        assert!(saturated(100.0, 98.5, share) && saturated(98.5, 100.0, share) && saturated(0.0, 0.0, share));
         assert!(saturated(100.0, 97.0, 0.05), "a wider threshold");
-        assert!(
-            !saturated(100.0, 97.0, SATURATION)
-                && !saturated(97.0, 100.0, SATURATION)
-                && !saturated(0.0, 1.0, SATURATION)
-        );
+        assert!(!saturated(100.0, 97.0, share) && !saturated(97.0, 100.0, share) && !saturated(0.0, 1.0, share));
     }
 }

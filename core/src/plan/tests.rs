@@ -9,6 +9,8 @@ use crate::scene::{CLASS_COUNT, Shelf};
 use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
+mod clairvoyant;
+
 const BUDGET: usize = 20;
 
 fn looking_from(id: u16, from: Point, target: Point) -> View {
@@ -107,6 +109,9 @@ struct Table {
     history: History,
     settings: PlannerSettings,
     seed: u64,
+    /// What pushes really do, in the order of the feasible ones: numbers of objects won and lost, voxels opened. Nothing
+    /// for those that are not told.
+    really: Vec<[usize; 3]>,
 }
 
 impl Table {
@@ -120,6 +125,7 @@ impl Table {
             history: History::default(),
             settings: PlannerSettings { candidates: 6, ..PlannerSettings::default() },
             seed: 7,
+            really: Vec::new(),
         }
     }
 
@@ -138,6 +144,10 @@ impl Table {
             belief.occupancy.iter_mut().for_each(|voxel| voxel[1] += sure);
             belief
         };
+        let really_push = |motions: &[PushMotion]| {
+            let told = |at: usize| self.really.get(at).copied().unwrap_or_default();
+            (0..motions.len()).map(|at| self.truth(told(at))).collect()
+        };
         let situation = Situation {
             belief: &self.belief,
             update: self.update.as_ref(),
@@ -149,8 +159,27 @@ impl Table {
             budget: BUDGET,
             seed: self.seed,
             really_look: &really_look,
+            really_push: &really_push,
         };
         decide(policy, &self.settings, &situation)
+    }
+
+    /// The truth of a push that wins and loses so many objects and opens so many voxels, the unknown ones first.
+    fn truth(&self, [won, lost, opened]: [usize; 3]) -> PushTruth {
+        let objects = |count: usize| (0..count as u16).map(crate::scene::ObjectId).collect();
+        let mut space = VoxelSet::empty(&self.belief.grid);
+        let unknown = (0..self.belief.grid.voxel_count()).filter(|at| self.belief.occupancy[*at] == [1.0, 1.0]);
+        unknown.take(opened).for_each(|at| space.insert(at));
+        PushTruth {
+            won: objects(won),
+            lost: objects(lost),
+            opened: space,
+            displacement_m: 0.1,
+            pushed_m: 0.1,
+            jammed: false,
+            dropped: Vec::new(),
+            toppled: Vec::new(),
+        }
     }
 
     /// Decides and takes down `count` steps in which the belief stays as it is.
@@ -347,7 +376,10 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
     assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
     let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
-    let opened = Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(&[prediction])[0];
+    let opened = Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(&[prediction.clone()])[0];
+    let sources = push_sources(Counted::Unseen, &field, &table.views, &ids, &prediction, None);
+    let sum: f32 = sources.iter().map(|(_, nats)| nats).sum();
+    assert!((sum - opened).abs() < 1e-3 * opened, "what the push opens is told by voxel: {sum}, {opened}");
     assert!(opened > 1.0 && decision.igm == opened, "{opened} {}", decision.igm);
     let best = &decision.candidates[decision.best_push.expect("a push")];
     assert!(best.gain == Some(opened) && best.view.is_some());

@@ -1,11 +1,12 @@
-//! What pushes are worth: IGM and Reg of every candidate.
+//! The worth of pushes: IGM and Reg of every candidate.
 
 use super::{CandidateRecord, Counted, PlannerSettings, Situation, look};
-use crate::arm::PushMotion;
+use crate::arm::{ArmTool, PushMotion};
 use crate::belief::{Belief, PushPrediction, SweptPush};
 use crate::camera::{ViewArray, ViewId};
-use crate::gain::{GainField, Openings, RayDensity, RayGains, gain_of_views};
-use crate::push::{Candidate, PushSampler, sample};
+use crate::gain::{GainField, Openings, RayDensity, RayGains, gain_of_views, gain_per_voxel};
+use crate::grid::VoxelSet;
+use crate::push::{Candidate, PushSampler, PushTruth, sample};
 use crate::rng::{ChaCha8Rng, stream};
 use rayon::prelude::*;
 
@@ -17,8 +18,30 @@ pub(super) struct Weighed {
     pub candidates: Vec<CandidateRecord>,
     /// Position of the push with the largest gain; `None` when no candidate is feasible.
     pub best: Option<usize>,
-    /// The arm's motion for that push.
-    pub motion: Option<PushMotion>,
+    /// The arm's motion for each candidate; `None` for those that were rejected.
+    pub motions: Vec<Option<PushMotion>>,
+}
+
+impl Weighed {
+    /// The arm's motion for the best push.
+    pub(super) fn take_motion(&mut self) -> Option<PushMotion> {
+        self.best.and_then(|at| self.motions[at].take())
+    }
+}
+
+/// Draws the push candidates of a decision, rejected ones too, in their order: the same ones whenever it is asked.
+///
+/// `actions` is the number of actions so far; [`sample`] says what else they depend on.
+pub fn draw_pushes(
+    settings: &PlannerSettings,
+    belief: &Belief,
+    seen: Option<&VoxelSet>,
+    arm: &ArmTool,
+    seed: u64,
+    actions: usize,
+) -> Vec<Candidate> {
+    let mut rng = push_stream(seed, actions);
+    sample(settings.push_sampler, belief, seen, arm, settings.candidates, &mut rng)
 }
 
 /// `Reg = min(0, H_s(belief) - H_s(predicted))`, nats.
@@ -28,16 +51,17 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
 
 /// Draws candidates and weighs the feasible ones.
 ///
-/// Where all voxels count, a push is worth the best single view after it: a coarse ranking first, then the winner with all
-/// views and rays. A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones. A push
-/// clears the list of used views, so every view counts. Where only unseen voxels count, a push is worth what it opens to
-/// the coarse views together ([`Openings`]), and of these the best one after the winner is named, for the eye only.
+/// Where all voxels count, a push is worth the best single view after it: a coarse ranking first, then the winner with
+/// all views and rays. A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones.
+/// A push clears the list of used views, so every view counts. Where only unseen voxels count, a push is worth what it
+/// opens to the coarse views together ([`Openings`]), and the best of these views after the winner is reported for
+/// display only.
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
-    let (sampler, count, mut rng) = (settings.push_sampler, settings.candidates, push_stream(situation));
-    let drawn = sample(sampler, belief, situation.seen, situation.arm, count, &mut rng);
+    let actions = situation.history.actions.len();
+    let drawn = draw_pushes(settings, belief, situation.seen, situation.arm, situation.seed, actions);
     let mut candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
-    let mut motions: Vec<Option<PushMotion>> = drawn.iter().map(|drawn| drawn.motion.clone()).collect();
+    let motions: Vec<Option<PushMotion>> = drawn.iter().map(|drawn| drawn.motion.clone()).collect();
     let (feasible, pushes): (Vec<usize>, Vec<SweptPush>) = drawn
         .into_iter()
         .enumerate()
@@ -46,9 +70,7 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         .unzip();
 
     let offered = situation.offered();
-    let ids = |step: usize| offered.iter().copied().step_by(step).collect::<Vec<ViewId>>();
-    let coarse = ids((offered.len() / COARSE_VIEWS).max(1));
-    let worth = Worth::new(settings.counted, field, views, coarse);
+    let worth = Worth::new(settings.counted, field, views, coarse(&offered));
     let predictions = update.predict_pushes(belief, &pushes);
     let mut best: Option<(usize, &PushPrediction)> = None;
     for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(&feasible) {
@@ -63,8 +85,8 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         let after = field.with_prediction(prediction);
         match &worth {
             Worth::View(..) => {
-                let all = ids(1);
-                let (view, gain) = best_view(&all, &gain_of_views(&after, views, &all, RayDensity::FULL));
+                let gains = gain_of_views(&after, views, &offered, RayDensity::FULL);
+                let (view, gain) = best_view(&offered, &gains);
                 (candidates[at].view, candidates[at].gain) = (view, Some(gain));
             }
             Worth::Opened(_, coarse) => {
@@ -74,8 +96,53 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         }
         at
     });
-    let motion = best.and_then(|at| motions[at].take());
-    Weighed { candidates, best, motion }
+    Weighed { candidates, best, motions }
+}
+
+/// Weighs pushes as [`weigh_pushes`], but the best one is the one that really brings most objects into sight, hidden ones
+/// taken off, and of equals the one that opens most space, the first of them. What it really does comes with it.
+pub(super) fn weigh_clairvoyantly(
+    settings: &PlannerSettings,
+    situation: &Situation<'_>,
+    field: &GainField,
+) -> (Weighed, Option<PushTruth>) {
+    let mut weighed = weigh_pushes(settings, situation, field);
+    let (at, motions): (Vec<usize>, Vec<PushMotion>) =
+        weighed.motions.iter().enumerate().filter_map(|(at, motion)| Some((at, motion.clone()?))).unzip();
+    let mut best: Option<(usize, PushTruth)> = None;
+    for (at, truth) in at.into_iter().zip((situation.really_push)(&motions)) {
+        let worth = |truth: &PushTruth| (truth.balance(), truth.opened.len());
+        if best.as_ref().is_none_or(|(_, best)| worth(&truth) > worth(best)) {
+            best = Some((at, truth));
+        }
+    }
+    weighed.best = best.as_ref().map(|(at, _)| *at);
+    (weighed, best.map(|(_, truth)| truth))
+}
+
+/// The views that rank the candidates, of those that are offered.
+fn coarse(offered: &[ViewId]) -> Vec<ViewId> {
+    offered.iter().copied().step_by((offered.len() / COARSE_VIEWS).max(1)).collect()
+}
+
+/// Where a push's worth comes from under its prediction: voxel positions and their nats, in ascending order of position.
+/// `field` is that of the belief before it, `offered` the views that count.
+///
+/// Where all voxels count it is the gain of `best`, the best view after the push, and nothing without one. Where only
+/// unseen voxels count it is what the push opens to all views together, as [`CandidateRecord::gain`] has it.
+pub fn push_sources(
+    counted: Counted,
+    field: &GainField,
+    array: &ViewArray,
+    offered: &[ViewId],
+    prediction: &PushPrediction,
+    best: Option<ViewId>,
+) -> Vec<(usize, f32)> {
+    match (counted, best) {
+        (Counted::All, None) => Vec::new(),
+        (Counted::All, Some(best)) => gain_per_voxel(&field.with_prediction(prediction), array, best, RayDensity::FULL),
+        (Counted::Unseen, _) => Openings::new(field, array, &coarse(offered), RayDensity::COARSE).per_voxel(prediction),
+    }
 }
 
 /// What makes a push worth it, and what is computed once for all candidates.
@@ -115,15 +182,16 @@ impl Worth {
 /// Draws one feasible push at random, from the frontier as in the paper, with those that were rejected on the way.
 pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
     let (belief, arm) = (situation.belief, situation.arm);
-    let mut drawn = sample(PushSampler::Frontier, belief, None, arm, 1, &mut push_stream(situation));
+    let mut rng = push_stream(situation.seed, situation.history.actions.len());
+    let drawn = sample(PushSampler::Frontier, belief, None, arm, 1, &mut rng);
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
-    let motion = best.and_then(|at| drawn[at].motion.take());
-    Weighed { candidates, best, motion }
+    let motions = drawn.into_iter().map(|drawn| drawn.motion).collect();
+    Weighed { candidates, best, motions }
 }
 
-fn push_stream(situation: &Situation<'_>) -> ChaCha8Rng {
-    stream(situation.seed, "pushes", situation.history.actions.len() as u64)
+fn push_stream(seed: u64, actions: usize) -> ChaCha8Rng {
+    stream(seed, "pushes", actions as u64)
 }
 
 fn record_of(candidate: &Candidate, situation: &Situation<'_>) -> CandidateRecord {

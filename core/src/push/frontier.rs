@@ -1,4 +1,4 @@
-//! The frontier: where the known things begin, seen from the shelf's entrance; and pushes from it into the shelf.
+//! The frontier: the first surely occupied voxels seen from the shelf's entrance; and pushes from it into the shelf.
 
 use super::{CONFIDENT, LENGTH_M, LIKELY, REACH_M, STANDOFF_M, TOOL_HEIGHT_M};
 use crate::arm::Push;

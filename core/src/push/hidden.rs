@@ -1,4 +1,4 @@
-//! Contacts before what nobody has seen: pushes from any side but the back against what stands before hidden space.
+//! Contacts before unseen space: pushes against the front or the sides of what stands before it.
 
 use super::{CONFIDENT, LENGTH_M, STANDOFF_M, TOOL_HEIGHT_M};
 use crate::arm::Push;
@@ -20,7 +20,8 @@ const LEAST: f64 = 0.05;
 /// Places between the tip's start and the contact that must be clear.
 const CLEAR_STEPS: u8 = 4;
 
-/// The floor cells at whose rim something surely stands at the tip's height, each as likely as there is much hidden behind.
+/// The floor cells at the rim of what surely stands at the tip's height; each is drawn with a probability proportional
+/// to the unseen space behind it.
 pub(super) struct Contacts {
     grid: Grid,
     /// Per floor cell whether something stands there at the tip's height.

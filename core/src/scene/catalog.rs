@@ -224,10 +224,11 @@ fn edit_distance(a: &str, b: &str) -> usize {
 mod tests {
     use super::*;
 
-    /// Name, size (m), mass (kg), radius of influence (m), doubled classes, own chance, large: as published.
-    type Published = (&'static str, [f32; 3], f32, f32, &'static [u8], f32, bool);
+    /// Name, size (m), mass (kg), radius of influence (m), doubled classes, own chance, large: as the design lists them (the
+    /// paper names the classes and gives no numbers).
+    type Listed = (&'static str, [f32; 3], f32, f32, &'static [u8], f32, bool);
 
-    const PUBLISHED: [Published; OBJECT_CLASS_COUNT] = [
+    const LISTED: [Listed; OBJECT_CLASS_COUNT] = [
         ("chips_can", [0.074, 0.074, 0.242], 0.205, 0.20, &[3, 4, 5, 7, 12, 13], 0.70, true),
         ("tomato_can", [0.066, 0.066, 0.102], 0.349, 0.15, &[0, 5, 11, 12], 0.10, false),
         ("coffee_can", [0.070, 0.070, 0.099], 0.404, 0.12, &[4, 5, 7, 12], 0.10, true),
@@ -245,15 +246,15 @@ mod tests {
     ];
 
     #[test]
-    fn every_class_is_as_published() {
+    fn every_class_is_as_the_design_lists_it() {
         let catalog = Catalog::standard();
         assert_eq!(catalog.classes.len(), OBJECT_CLASS_COUNT);
-        for (class, (name, size, mass, influence, doubles, own, large)) in catalog.classes.iter().zip(PUBLISHED) {
+        for (class, (name, size, mass, influence, doubles, own, large)) in catalog.classes.iter().zip(LISTED) {
             assert_eq!(class.name, name);
             assert_eq!(catalog.by_name(name).map(|c| c.id), Some(class.id));
             let bounds = class.solid.bounds();
-            for (measured, published) in bounds.size().iter().zip(size) {
-                assert!((measured - published).abs() < 1e-6, "{name} {:?}", bounds.size());
+            for (measured, listed) in bounds.size().iter().zip(size) {
+                assert!((measured - listed).abs() < 1e-6, "{name} {:?}", bounds.size());
             }
             assert!(bounds.min.z.abs() < 1e-7 && (bounds.min.x + bounds.max.x).abs() < 1e-6, "{name} stands centred");
             let doubled: Vec<u8> = class.doubles.iter().map(|id| id.0).collect();

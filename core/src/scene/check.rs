@@ -9,13 +9,13 @@ use crate::Result;
 pub const MAX_VOXELS: usize = 10_000_000;
 /// Most objects a scene may have.
 pub const MAX_OBJECTS: usize = 500;
-/// Shelf edges that are taken for a shelf, metres.
+/// Smallest and largest edge of a shelf, metres.
 const SHELF_EDGE_M: [f32; 2] = [0.05, 5.0];
-/// Voxel edges that are taken for a map, metres.
+/// Smallest and largest edge of a voxel, metres.
 const VOXEL_EDGE_M: [f32; 2] = [0.001, 0.05];
-/// Stretch factors that leave an object an object.
+/// Smallest and largest stretch factor of an object.
 const SCALE: [f32; 2] = [0.05, 20.0];
-/// Numbers beyond this are no positions (metres) of anything.
+/// Larger numbers are refused as positions, metres.
 const FAR_M: f32 = 100.0;
 /// Standing outside by this much, metres, is rounding.
 const ROUNDING_M: f32 = 0.000_5;

@@ -90,7 +90,7 @@ struct RawObject {
     mesh: Option<Spanned<RawMesh>>,
 }
 
-/// Only the format number, so that a file of another format is told so and not which of its keys are unknown here.
+/// Only the format number, so that the error for a file of another format names the format and not unknown keys.
 #[derive(Deserialize)]
 struct RawHead {
     format: Option<Spanned<toml::Value>>,

@@ -1,6 +1,6 @@
 //! Whether placed bodies overlap, exactly, by the separating-axis theorem on their convex parts.
 //!
-//! Most pairs are told apart by their outlines on the floor plan; what remains is tested along every face normal and
+//! Most pairs are separated by their outlines on the floor plan; the others are tested along every face normal and
 //! every product of two edges, so that an object may stand under the shoulder of another.
 
 use super::body::Body;

@@ -1,4 +1,4 @@
-//! What a map is worth that knows everything but some objects.
+//! Scores of a map that is perfect but for some objects.
 
 use super::Scores;
 use crate::belief::Belief;
@@ -9,8 +9,8 @@ use crate::world::TruthMap;
 /// Evidence of a voxel or a cell that is known: as good as certain.
 const KNOWN: f32 = 1e6;
 
-/// The scores of a map that is right and certain about everything but the `missing` objects, of which it knows nothing
-/// and takes their room for free: with the objects that no view shows, what looking alone can reach without a guess.
+/// The scores of a map that is right and certain about everything but the `missing` objects, and holds their space
+/// free. With the objects that no view shows as `missing`, it is the best that looking alone can reach without a guess.
 pub fn scores_without(grid: &Grid, bodies: &[Body], missing: &[ObjectId]) -> Scores {
     let shown: Vec<Body> = bodies.iter().filter(|body| !missing.contains(&body.id)).cloned().collect();
     Scores::of(&belief_in(grid, &TruthMap::of(grid, &shown)), &TruthMap::of(grid, bodies))

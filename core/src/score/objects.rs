@@ -1,4 +1,4 @@
-//! What became of each object: found, misclassified, not found; and objects that were made up.
+//! The verdict on each object: found, misclassified, not found; and hallucinated objects.
 //!
 //! A floor cell *shows an object* when a voxel of its column in the scored volume is believed occupied (`p > 0.5`). Its
 //! class counts when one class is likelier than every other; a tie (no label seen yet) is no class.

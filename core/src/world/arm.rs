@@ -1,4 +1,4 @@
-//! A push by the arm: its links follow the motion as kinematic bodies, and what they meet is taken down.
+//! A push by the arm: its links follow the motion as kinematic bodies, and the objects that they touch are recorded.
 
 use super::physics::{BLOCKING_FORCE_N, TIME_STEP_S};
 use super::{PushOutcome, World};
@@ -15,7 +15,7 @@ pub struct LinkContact {
     pub object: ObjectId,
 }
 
-/// What became of a motion.
+/// How a motion ended.
 struct Ride {
     /// The last configuration.
     joints: Joints,

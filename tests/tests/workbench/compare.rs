@@ -25,7 +25,7 @@ fn two_policies_run_side_by_side_on_one_clock() {
     assert_eq!((a.record.config.policy, b.record.config.policy), (PolicyKind::Mem, PolicyKind::Random));
     assert_eq!((a.record.config.seed, model.cursor), (b.record.config.seed, 3), "the clock followed both");
     assert_ne!(a.path, b.path);
-    assert!(window.sees("They part at step 1"));
+    assert!(window.sees("First difference at step 1: "));
     for words in ["Floor map of A", "Floor map of B", "Floor map of A − B", "A solid, B dashed"] {
         assert!(window.sees(words), "{words}");
     }

@@ -86,3 +86,25 @@ fn every_control_of_every_layout_has_a_name() {
     }
     assert!(nameless.is_empty(), "{nameless:#?}");
 }
+
+/// Shorthand that nobody can look up on the window.
+const SHORTHAND: [&str; 6] = ["A|B", "·IGV", "vacuity", "ρ", "worn", "gone on with"];
+
+#[test]
+fn no_text_on_the_window_is_shorthand() {
+    let mut window = Window::with_quick_episode(2);
+    window.click("Run");
+    window.click("Branch from here");
+    window.app().model.picked = Some(Picked::Cell(5_000));
+    let mut found = Vec::new();
+    for layout in LayoutKind::ALL {
+        window.app().ask(Command::Layout(layout));
+        window.wait();
+        for node in window.harness.query_all_by(|_| true) {
+            let label = node.accesskit_node().label().unwrap_or_default();
+            found
+                .extend(SHORTHAND.iter().filter(|word| label.contains(**word)).map(|_| format!("{layout:?}: {label}")));
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
+}

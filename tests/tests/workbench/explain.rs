@@ -16,7 +16,7 @@ fn a_cell_and_a_voxel_are_asked_about_by_pointer_and_by_key() {
     window.click("Map of semantics");
     let Some(Picked::Cell(cell)) = window.model().picked else { panic!("{:?}", window.model().picked) };
     assert_eq!(window.model().kept.layout, LayoutKind::Why);
-    assert!(window.sees("Floor cell at") && window.sees("vacuity") && window.sees("What changed it"));
+    assert!(window.sees("Floor cell at") && window.sees("unknown share") && window.sees("What changed it"));
     // The arrow keys walk over the map that has the focus.
     window.harness.get_by_label("Map of semantics").focus();
     window.harness.run_steps(2);
@@ -38,8 +38,8 @@ fn a_cell_and_a_voxel_are_asked_about_by_pointer_and_by_key() {
     // History and causes lead to their steps.
     window.key(Modifiers::NONE, Key::Home);
     assert_eq!(window.model().cursor, 0);
-    if window.sees("step 1: ") {
-        window.click_first("step 1: ");
+    if window.sees("step 1, look") {
+        window.click_first("step 1, look");
         assert_eq!(window.model().cursor, 1);
     }
 }
@@ -57,7 +57,7 @@ fn a_views_gain_is_explained_and_follows_the_clock() {
     let sum: f32 = source.nats.iter().map(|(_, nats)| nats).sum();
     let gain = window.session().record.steps[1].decision.gains[usize::from(view.0)];
     assert!((sum - gain).abs() <= 0.02 * gain.max(1.0), "the voxels' nats sum to the view's gain: {sum}, {gain}");
-    assert!(window.sees("By height") && window.sees("from all voxels, nats"));
+    assert!(window.sees("By height") && window.sees("nats from all voxels together"));
     window.click("Step 0");
     assert_eq!(window.model().gain_source.as_ref().map(|source| (source.of.1, source.view)), Some((0, view)));
     window.harness.get_by_label("Gain of the views at target 2").focus();
@@ -66,8 +66,8 @@ fn a_views_gain_is_explained_and_follows_the_clock() {
     assert_ne!(window.model().view, Some(view));
 }
 
-#[test]
-fn a_push_is_previewed_done_and_reviewed() {
+/// A window in which pushes have been weighed after four looks.
+fn with_weighed_pushes() -> Window {
     let mut window = Window::with_pushes(8);
     // Something has to be seen, three times over, before it is sure enough to be pushed.
     for view in [133, 136, 163, 166] {
@@ -75,6 +75,44 @@ fn a_push_is_previewed_done_and_reviewed() {
         window.wait();
     }
     window.click("Decide");
+    window
+}
+
+#[test]
+fn the_layout_of_pushes_begins_with_the_chosen_push_and_a_branch_keeps_the_one_that_was_chosen() {
+    let mut window = with_weighed_pushes();
+    let decision = window.session().pending.clone().expect("a decision");
+    assert_eq!(window.model().candidate, None);
+    window.layout(LayoutKind::Push);
+    let pushed = decision.candidates.iter().position(|candidate| Action::Push(candidate.push) == decision.action);
+    let first = pushed.or(decision.best_push).expect("a push was weighed");
+    assert_eq!(window.model().candidate, Some(first));
+    let preview = window.model().preview.clone().expect("a prediction, unasked");
+    assert_eq!((preview.of, preview.push), ((window.session().id, 4), decision.candidates[first].push));
+
+    // Another one is chosen, and the episode is branched.
+    let other =
+        decision.candidates.iter().enumerate().find(|(at, candidate)| *at != first && candidate.rejection.is_none());
+    let (other, _) = other.expect("another feasible push");
+    window.click_first(&format!("Push {other}, value"));
+    let title = window.session().title();
+    window.click("Branch from here");
+    let branch = window.session();
+    assert_eq!((window.model().sessions.len(), branch.steps()), (2, 4));
+    assert_eq!(branch.pending.as_deref(), Some(&*decision), "what was decided holds in the branch");
+    assert_eq!(window.model().candidate, Some(other));
+    let preview = window.model().preview.clone().expect("a prediction");
+    assert_eq!((preview.of, preview.push), ((branch.id, 4), decision.candidates[other].push));
+    assert_eq!(branch.title(), format!("{title} from step 4"));
+    assert!(branch.path.to_string_lossy().ends_with("-from-step-4"), "{}", branch.path.display());
+    assert!(window.sees(&format!("{title} from step 4")));
+    window.click("Do it");
+    assert_eq!((window.steps(), window.session().record.steps[4].action), (5, decision.action));
+}
+
+#[test]
+fn a_push_is_previewed_done_and_reviewed() {
+    let mut window = with_weighed_pushes();
     let decision = window.session().pending.clone().expect("a decision");
     let feasible = decision.candidates.iter().filter(|candidate| candidate.rejection.is_none()).count();
     assert!((1..=12).contains(&feasible), "as many as the form says at most: {feasible}");
@@ -93,7 +131,7 @@ fn a_push_is_previewed_done_and_reviewed() {
     assert_eq!(window.steps(), 5, "{:?}", window.toasts());
     assert_eq!(window.session().record.steps[4].action, Action::Push(decision.candidates[feasible].push));
     // The arm can be moved along what it did.
-    assert!(window.sees("The arm in step 5") && window.sees("way in"));
+    assert!(window.sees("The arm in step 5") && window.sees("approach"));
     let scrubbed = |window: &Window| window.model().panels.motion_s((window.session().id, 5));
     assert_eq!(scrubbed(&window), None);
     let slider = "Time in the arm's motion";
@@ -101,7 +139,7 @@ fn a_push_is_previewed_done_and_reviewed() {
     window.harness.run_steps(2);
     window.key(Modifiers::NONE, Key::ArrowRight);
     assert!(scrubbed(&window).is_some_and(|at_s| at_s > 0.0), "{:?}", scrubbed(&window));
-    window.click("Let go");
+    window.click("Hide arm");
     assert_eq!(scrubbed(&window), None);
     // One step back, the same push shows what happened beside what was predicted.
     window.click("Step 4");

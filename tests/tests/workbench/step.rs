@@ -36,7 +36,7 @@ fn open_decide_do_and_run() {
     window.click("Decide");
     let decision = window.session().pending.clone().expect("a decision");
     assert_eq!(decision.gains.len(), 300);
-    assert!(window.sees("Look: IGV") && window.sees("Best views"));
+    assert!(window.sees("Look (IGV)") && window.sees("Best views"));
     window.click("Do it");
     assert_eq!((window.steps(), window.model().cursor), (1, 1));
     assert_eq!(window.session().record.steps[0].action, decision.action);

@@ -6,6 +6,7 @@ use nudge::workbench::app::{App, Options};
 use nudge::workbench::command::Command;
 use nudge::workbench::model::{LayoutKind, Model};
 use nudge::workbench::session::Session;
+use nudge_core::belief::CLASSICAL;
 use nudge_core::plan::PolicyKind;
 use nudge_tests::root;
 use re_viewer::external::egui::{self, Key, Modifiers, vec2};
@@ -41,9 +42,12 @@ impl Window {
         let folder = tempfile::tempdir().expect("folder");
         let options = Options { out: folder.path().join("out"), scenes: scenes.to_owned(), ..Options::default() };
         let threads = options.threads.clone();
-        let harness = Harness::builder()
+        let mut harness = Harness::builder()
             .with_size(vec2(1440.0, 900.0))
             .build_eframe(move |cc| App::without_viewer(&cc.egui_ctx, options.clone()));
+        // The networks take longer, and not every build has them.
+        let form = &mut harness.state_mut().model.kept.form;
+        *form = form.clone().with_belief(CLASSICAL);
         Self { harness, folder, threads }
     }
 

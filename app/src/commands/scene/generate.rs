@@ -1,6 +1,7 @@
 //! `nudge scene generate`: random scenes.
 
-use super::{progress, unknown_class, with_absolute_meshes};
+use super::{unknown_class, with_absolute_meshes};
+use crate::commands::progress::Progress;
 use crate::commands::{print, to_json, warn};
 use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::scene::{Catalog, ClassId, GenerateConfig, Scene, Shelf, generate};
@@ -90,18 +91,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return Err(Error::input(file, "", "is there already; --force overwrites it").into());
     }
     let views = (args.hidden > 0).then(|| ViewArray::named("standard300")).transpose()?;
-    let bar = progress(args.count, "generating");
+    let bar = Progress::new("generate", args.count);
     // All scenes before any file, so that nothing half-done is left behind.
     let scenes = files
         .par_iter()
         .enumerate()
         .map(|(at, file)| {
             let generated = generate_one(args, &config, &catalog, views.as_ref(), at, file);
-            bar.inc(1);
+            bar.inc();
             generated
         })
         .collect::<nudge_core::Result<Vec<_>>>()?;
-    bar.finish_and_clear();
+    bar.finish();
     std::fs::create_dir_all(&args.out).map_err(|error| Error::io(&args.out, error))?;
     for ((scene, _), file) in scenes.iter().zip(&files) {
         scene.save_toml(file)?;

@@ -1,6 +1,7 @@
 //! `nudge scene rescale`: the same scenes with every object in another size.
 
-use super::{progress, with_absolute_meshes};
+use super::with_absolute_meshes;
+use crate::commands::progress::Progress;
 use crate::commands::{print, to_json, warn};
 use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::scene::{Catalog, Scene, rescale};
@@ -10,7 +11,7 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-/// Stretch every object of scenes by random factors, moved no further apart than that takes
+/// Stretch every object of scenes by random factors; objects that then overlap are moved apart as little as possible
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// Scene files
@@ -64,7 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let catalog = Catalog::standard();
     let views = ViewArray::named("standard300")?;
     let targets = targets(args)?;
-    let bar = progress(args.files.len(), "rescaling");
+    let bar = Progress::new("rescale", args.files.len());
     // All scenes before any file, so that nothing half-done is left behind.
     let rescaled = args
         .files
@@ -72,11 +73,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         .zip(&targets)
         .map(|(file, target)| {
             let rescaled = rescale_one(args, file, target, &catalog, &views);
-            bar.inc(1);
+            bar.inc();
             rescaled
         })
         .collect::<anyhow::Result<Vec<_>>>()?;
-    bar.finish_and_clear();
+    bar.finish();
     std::fs::create_dir_all(&args.out).map_err(|error| Error::io(&args.out, error))?;
     for ((scene, _), target) in rescaled.iter().zip(&targets) {
         scene.save_toml(target)?;

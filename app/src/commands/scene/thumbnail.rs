@@ -1,6 +1,6 @@
 //! `nudge scene thumbnail`: pictures of scenes, one by one or together on a sheet.
 
-use super::progress;
+use crate::commands::progress::Progress;
 use crate::commands::{print, warn};
 use crate::figure::{INK, RasterStyle, Svg, Text, text_width};
 use crate::picture::{self, View};
@@ -38,16 +38,16 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let catalog = Catalog::standard();
     let view = if args.above { View::Above } else { View::Front };
-    let bar = progress(args.files.len(), "drawing");
+    let bar = Progress::new("draw", args.files.len());
     for file in &args.files {
         let (scene, warnings) = Scene::load(file, &catalog)?;
         warnings.iter().for_each(|warning| bar.suspend(|| warn(&format!("{}: {warning}", file.display()))));
         let out = args.out.clone().unwrap_or_else(|| file.with_extension("png"));
         picture::save(&picture::thumbnail(&scene, &catalog, view, args.width.unwrap_or(640))?, &out)?;
         bar.suspend(|| print(&format!("{}\n", out.display())))?;
-        bar.inc(1);
+        bar.inc();
     }
-    bar.finish_and_clear();
+    bar.finish();
     Ok(())
 }
 
@@ -63,15 +63,15 @@ fn sheet(args: &Args, path: &Path) -> anyhow::Result<()> {
     let catalog = Catalog::standard();
     let view = if args.above { View::Above } else { View::Front };
     let pixels = args.width.unwrap_or(320);
-    let bar = progress(args.files.len(), "drawing");
+    let bar = Progress::new("draw", args.files.len());
     let mut pictures = Vec::new();
     for file in &args.files {
         let (scene, warnings) = Scene::load(file, &catalog)?;
         warnings.iter().for_each(|warning| bar.suspend(|| warn(&format!("{}: {warning}", file.display()))));
         pictures.push((picture::thumbnail(&scene, &catalog, view, pixels)?, scene.name));
-        bar.inc(1);
+        bar.inc();
     }
-    bar.finish_and_clear();
+    bar.finish();
     // A unit is a pixel.
     let width = pixels as f32;
     let height = pictures.iter().map(|(picture, _)| picture.height()).max().unwrap_or(1) as f32;

@@ -1,5 +1,6 @@
 //! The losses of a training run on their way to the terminal and to `FILE.jsonl`.
 
+use crate::commands::progress::words;
 use crate::commands::warn;
 use crate::record::training::CurveRecorder;
 use nudge_core::Error;
@@ -7,7 +8,7 @@ use serde_json::{Value, json};
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Means of named losses since the last report, and the file that keeps them: a line of JSON per report, of `kind` `loss`
 /// or `validation`.
@@ -48,8 +49,8 @@ impl Curve {
         }
     }
 
-    /// Tells the means since the last report.
-    pub(super) fn report(&mut self, updates: u64) -> anyhow::Result<()> {
+    /// Tells the means since the last report, and how long the run still takes where it has an end.
+    pub(super) fn report(&mut self, updates: u64, left: Option<Duration>) -> anyhow::Result<()> {
         if self.sums.is_empty() {
             return Ok(());
         }
@@ -63,6 +64,9 @@ impl Curve {
             if let Some(recorder) = &self.recorder {
                 recorder.value(name, updates, mean)?;
             }
+        }
+        if let Some(left) = left {
+            text += &format!("   about {} left", words(left));
         }
         eprintln!("{text}");
         self.write(&line)

@@ -2,9 +2,10 @@
 
 use super::session::is_weights;
 use super::{ExportArgs, Network, lineage};
+use crate::commands::progress::Progress;
 use crate::commands::{calibrate, print};
 use nudge_core::Error;
-use nudge_core::belief::Classical;
+use nudge_core::belief::{BeliefUpdate, Classical};
 use nudge_core::cnabu::{Card, Cnabu, Layout, OBSERVE_WEIGHTS, PUSH_WEIGHTS, Tensor, UPDATES, half, write_tensors};
 use nudge_core::learn::{
     Dataset, MapSample, ObserveTrainer, PushSample, PushTrainer, Sample, Stretch, TrainSettings, evaluate,
@@ -35,7 +36,10 @@ fn observe(args: &ExportArgs) -> anyhow::Result<()> {
     card.data.insert("test".into(), command(&test));
     write(&path, &card, &trainer.mean_weights(), args.half)?;
     // What is scored is what was written, rounding included.
-    card.scores = calibrate::scored(1, &evaluate(&test, &Cnabu::load_file(&path)?, &mut |_| ())?);
+    let progress = Progress::new("sigma_o on views", test.len());
+    let tallies = evaluate(&test, &Cnabu::load_file(&path)?, &mut |done| progress.at(done))?;
+    progress.finish();
+    card.scores = calibrate::scored(1, &tallies);
     card.write(&path)?;
     print(&format!("{}\n{}", path.display(), calibrate::table("sigma_o", &card.scores)))
 }
@@ -60,13 +64,22 @@ fn push(args: &ExportArgs) -> anyhow::Result<()> {
     if let Some(val) = &args.val {
         let val = open::<PushSample>(val, usize::MAX)?;
         let untempered = trainer.with(Cnabu::load_file(&args.out.join(OBSERVE_WEIGHTS))?);
-        card.change_temperature = Some(fit_change_temperature(&val, &untempered)? as f32);
+        let progress = Progress::new("temperature of sigma_m", val.len());
+        let temperature = fit_change_temperature(&val, &untempered, &mut |done| progress.at(done))?;
+        progress.finish();
+        card.change_temperature = Some(temperature as f32);
         card.data.insert("val".into(), command(&val));
     }
     write(&path, &card, &trainer.mean_weights(), args.half)?;
     let update = Cnabu::load(&args.out)?;
-    let ours = evaluate_pushes(&test, &update, &update, &mut |_| ())?;
-    let classical = evaluate_pushes(&test, &update, &Classical, &mut |_| ())?;
+    let tallies = |what: &str, predict: &dyn BeliefUpdate| {
+        let progress = Progress::new(what, test.len());
+        let tallies = evaluate_pushes(&test, &update, predict, &mut |done| progress.at(done));
+        progress.finish();
+        tallies
+    };
+    let ours = tallies("sigma_m on pushes", &update)?;
+    let classical = tallies("classical on pushes", &Classical)?;
     for (name, scores) in [
         ("sigma_m", ours.predicted.scores()),
         ("unchanged", ours.unchanged.scores()),
@@ -100,7 +113,7 @@ fn write(path: &Path, card: &Card, weights: &[(String, Tensor)], halved: bool) -
     card.write(path)
 }
 
-/// Tells the card how its weights came about, as a command that can be typed again, and settings.
+/// Writes to the card how its weights were made: the command that makes the data, and the settings.
 fn describe<S: Sample>(
     card: &mut Card,
     args: &ExportArgs,

@@ -1,4 +1,4 @@
-//! What weights had behind them when a run began with them: kept beside the run, told on the card of what came of it.
+//! The history of weights that a run started with: kept beside the run, and written to the card of its own weights.
 
 use nudge_core::Result;
 use nudge_core::cnabu::Card;
@@ -10,7 +10,7 @@ const BEFORE: &str = "train_before";
 /// Name on a card of the data of its own run.
 const TRAIN: &str = "train";
 
-/// Whose card is kept beside the run: as if the weights that it began with lay there.
+/// Where that card is kept: beside the run, as if the weights that it started with lay there.
 fn kept(run: &Path) -> PathBuf {
     let name = run.file_name().unwrap_or_default().to_string_lossy();
     run.with_file_name(format!("{name}-before.safetensors"))
@@ -24,7 +24,7 @@ pub(super) fn keep(run: &Path, weights: Option<&Path>, network: &str) -> Result<
     }
 }
 
-/// Tells a card what was trained on before its run.
+/// Writes to a card what was trained on before its run.
 pub(super) fn tell(run: &Path, card: &mut Card) -> Result<()> {
     if !nudge_core::cnabu::card_path(&kept(run)).exists() {
         return Ok(());

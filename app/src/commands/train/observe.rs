@@ -4,6 +4,7 @@ use super::ObserveArgs;
 use super::curve::Curve;
 use super::session::{self, Pupil};
 use crate::commands::calibrate;
+use crate::commands::progress::Progress;
 use nudge_core::Error;
 use nudge_core::cnabu::{self, Cnabu, Layout};
 use nudge_core::learn::{AfterPushes, Dataset, MapSample, ObserveTrainer, TrainSettings, evaluate};
@@ -72,7 +73,10 @@ impl Pupil for Observer {
     /// The errors of both maps, averaged over the views.
     fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64> {
         let Some(val) = &self.val else { return Ok(0.0) };
-        let scores = calibrate::scored(1, &evaluate(val, &self.trainer.update(), &mut |_| ())?);
+        let progress = Progress::new("validation", val.len());
+        let tallies = evaluate(val, &self.trainer.update(), &mut |done| progress.at(done))?;
+        progress.finish();
+        let scores = calibrate::scored(1, &tallies);
         crate::output::print_error(&calibrate::table("sigma_o", &scores));
         curve.validation(self.trainer.updates(), serde_json::to_value(&scores)?)?;
         Ok(scores.iter().map(|s| 2.0 - s.occupancy_iou - s.semantic_miou).sum::<f64>() / scores.len() as f64)

@@ -3,6 +3,7 @@
 use super::PushArgs;
 use super::curve::Curve;
 use super::session::Pupil;
+use crate::commands::progress::Progress;
 use nudge_core::Error;
 use nudge_core::cnabu::{self, Cnabu, Layout, OBSERVE_WEIGHTS};
 use nudge_core::learn::{Dataset, Priors, PushSample, PushTrainer, VIEWS, evaluate_pushes};
@@ -52,7 +53,9 @@ impl Pupil for Pusher {
     fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64> {
         let Some(val) = &self.val else { return Ok(0.0) };
         let update = self.trainer.with(Cnabu::load_file(&self.weights)?);
-        let tallies = evaluate_pushes(val, self.priors.network(), &update, &mut |_| ())?;
+        let progress = Progress::new("validation", val.len());
+        let tallies = evaluate_pushes(val, self.priors.network(), &update, &mut |done| progress.at(done))?;
+        progress.finish();
         let (before, after) = (tallies.unchanged.scores(), tallies.predicted.scores());
         eprintln!(
             "sigma_m   on changed cells: occupied IoU {:.3} ({:.3} as if unchanged), mIoU {:.3} ({:.3}), mECE {:.3} ({:.3})",

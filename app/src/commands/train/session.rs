@@ -1,4 +1,4 @@
-//! What a training run does beside training: it reports, keeps checkpoints, validates, and knows when to stop.
+//! What a training run does beside training: reports, checkpoints, validation, and stopping.
 
 use super::curve::Curve;
 use super::{SessionArgs, lineage};
@@ -20,7 +20,7 @@ pub(super) trait Pupil {
     fn save(&self, out: &Path) -> nudge_core::Result<()>;
     /// Updates of the weights so far.
     fn updates(&self) -> u64;
-    /// Scores the running mean of the weights; what is to fall.
+    /// Validates the running mean of the weights; returns the error, lower is better.
     fn validate(&self, curve: &mut Curve) -> anyhow::Result<f64>;
 }
 
@@ -44,8 +44,8 @@ impl SessionArgs {
         nudge_core::cnabu::device(&self.device)
     }
 
-    /// The network as the run begins or goes on: fresh, from its own checkpoint, that of another run, or finished weights.
-    /// Refuses to write over a run that is there.
+    /// The network at the start of the run: fresh, from its own checkpoint, from that of another run, or from finished
+    /// weights. Refuses to write over a run that is there.
     pub(super) fn trainer<N: Network>(
         &self,
         settings: TrainSettings,
@@ -93,14 +93,14 @@ impl SessionArgs {
         // Early, so that a place that cannot be written is told at once.
         pupil.save(&self.out)?;
         let mut curve = Curve::open(&self.out, self.resume, self.follow, pupil.updates())?;
-        let started = Instant::now();
+        let (started, begun_at) = (Instant::now(), pupil.updates());
         let (mut reported, mut saved, mut validated) = (started, started, started);
         let (mut least, mut stale) = (f64::INFINITY, 0);
         while !self.is_over(pupil.updates(), started) {
             pupil.train(self.rate(pupil.updates()), &mut curve)?;
             if reported.elapsed() >= REPORT_EVERY {
                 reported = Instant::now();
-                curve.report(pupil.updates())?;
+                curve.report(pupil.updates(), self.left(begun_at, pupil.updates(), started.elapsed()))?;
             }
             if saved.elapsed().as_secs_f64() >= 60.0 * self.checkpoint_minutes {
                 saved = Instant::now();
@@ -121,11 +121,21 @@ impl SessionArgs {
             }
         }
         pupil.save(&self.out)?;
-        curve.report(pupil.updates())?;
+        curve.report(pupil.updates(), None)?;
         if self.val.is_some() {
             pupil.validate(&mut curve)?;
         }
         crate::commands::print(&format!("{}: {} updates\n", checkpoint_path(&self.out).display(), pupil.updates()))
+    }
+
+    /// Time to the end that was asked for, as far as one was: `--patience` may stop it sooner.
+    fn left(&self, begun_at: u64, updates: u64, elapsed: Duration) -> Option<Duration> {
+        let (made, elapsed) = (updates.saturating_sub(begun_at) as f64, elapsed.as_secs_f64());
+        let by_updates = self.updates.map(|end| elapsed * end.saturating_sub(updates) as f64 / made);
+        let by_minutes = self.minutes.map(|minutes| (60.0 * minutes - elapsed).max(0.0));
+        // What is no time, or longer than can be told, is left out.
+        let times = by_updates.into_iter().chain(by_minutes).filter_map(|time| Duration::try_from_secs_f64(time).ok());
+        times.min()
     }
 
     fn is_over(&self, updates: u64, started: Instant) -> bool {

@@ -1,10 +1,11 @@
 //! What is done with the commands that panels, menus and shortcuts give.
 
-use super::{App, ChosenFor, Opening, Pair};
+use super::{App, ChosenFor, Kept, Opening, Pair};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::{Dialog, Reply};
 use crate::workbench::model::{GainSource, LayoutKind, Preview};
-use crate::workbench::session::{Activity, Session, SessionId};
+use crate::workbench::panels::weighed;
+use crate::workbench::session::{Activity, Session, SessionId, branch_suffix};
 use crate::workbench::worker::{Begin, Order, Worker};
 use nudge_core::arm::Push;
 use nudge_core::belief::SweptPush;
@@ -24,10 +25,7 @@ impl App {
             Command::Menu(entry) => self.menu(entry),
             Command::Open(path) => self.open(&path),
             Command::Start => self.start_chosen(),
-            Command::Show(id) => {
-                self.model.browsing = false;
-                self.model.show(id);
-            }
+            Command::Show(id) => self.show(id),
             Command::Close(id) => self.close(id),
             Command::CompareWith(other) => {
                 self.model.other = other;
@@ -35,13 +33,7 @@ impl App {
                     self.lay_out(LayoutKind::Compare);
                 }
             }
-            Command::GoTo(step) => {
-                let step = step.min(self.model.last_step());
-                if step != self.model.cursor {
-                    self.model.candidate = None;
-                }
-                self.model.cursor = step;
-            }
+            Command::GoTo(step) => self.model.go_to(step.min(self.model.last_step())),
             Command::Layout(layout) => self.lay_out(layout),
             Command::Decide => self.order(Order::Decide, Activity::Deciding),
             Command::DoIt => match self.model.session().and_then(|session| session.pending.clone()) {
@@ -54,6 +46,7 @@ impl App {
             Command::RunBoth => self.run_both(),
             Command::Pause => self.stop(Worker::pause),
             Command::Cancel => self.cancel(),
+            Command::CancelOpening(id) => self.workers.get(&id).into_iter().for_each(Worker::cancel),
             Command::CancelTask(at) => self.tasks.under_way().get(at).into_iter().for_each(|task| task.cancel()),
             Command::Branch => self.branch(),
             Command::Preview(push) => self.preview(push),
@@ -78,12 +71,34 @@ impl App {
         self.model.toasts.tell(level, text);
     }
 
+    /// Shows an open episode, in place of the scenes to choose from, a recording or the editor.
+    pub(super) fn show(&mut self, id: SessionId) {
+        if self.model.kept.layout == LayoutKind::Author {
+            self.model.kept.layout = LayoutKind::Episode;
+        }
+        self.model.browsing = false;
+        self.close_recording();
+        self.model.show(id);
+    }
+
     /// Shows another layout; only a comparison goes on after the shown episode's end.
-    fn lay_out(&mut self, layout: LayoutKind) {
+    pub(super) fn lay_out(&mut self, layout: LayoutKind) {
         self.model.kept.layout = layout;
         self.model.browsing = false;
         self.close_recording();
-        self.model.cursor = self.model.cursor.min(self.model.last_step());
+        if layout == LayoutKind::Compare {
+            self.choose_other();
+        }
+        self.model.go_to(self.model.cursor.min(self.model.last_step()));
+    }
+
+    /// Compares with the only other episode there is, unless another one was chosen.
+    pub(super) fn choose_other(&mut self) {
+        let mut others =
+            self.model.sessions.iter().map(|session| session.id).filter(|id| Some(*id) != self.model.shown);
+        if let (None, Some(only), None) = (self.model.other_session(), others.next(), others.next()) {
+            self.model.other = Some(only);
+        }
     }
 
     fn close_recording(&mut self) {
@@ -100,6 +115,7 @@ impl App {
                 if self.model.kept.layout == LayoutKind::Author {
                     self.lay_out(LayoutKind::Episode);
                 }
+                self.close_recording();
                 self.model.browsing = true;
             }
             MenuCommand::OpenScene | MenuCommand::OpenEpisode => self.browse(entry, ChosenFor::Opening),
@@ -175,12 +191,11 @@ impl App {
         }
     }
 
-    pub(super) fn spawn(&mut self, title: String, begin: Begin) -> SessionId {
+    /// Opens an episode on a thread of its own; what is in sight stays there until it is open.
+    pub(super) fn spawn(&mut self, opening: Opening, begin: Begin) -> SessionId {
         let id = SessionId(self.next_id);
         self.next_id += 1;
-        self.openings.insert(id, Opening { title, activity: Activity::Opening { done: 0, of: 0 } });
-        self.close_recording();
-        self.model.browsing = false;
+        self.openings.insert(id, opening);
         self.begun.insert(begin.path().to_owned());
         let (events, wake) = (self.events.0.clone(), self.wake.clone());
         let worker = Worker::spawn(id, begin, self.catalog.clone(), events, wake, &self.options.threads);
@@ -234,13 +249,14 @@ impl App {
             belief: form.belief.clone(),
             seed: form.seed,
             budget: form.budget.max(1),
-            views: "standard300".to_owned(),
+            views: form.views.trim().to_owned(),
             planner: form.planner,
-            noise: None,
+            noise: form.noise,
         };
-        let out = self.free_directory(&scene, &config);
+        let out = self.free_directory(&scene, &config, "");
         let title = format!("{}, {}, seed {}", scene.name, config.policy, config.seed);
-        self.spawn(title, Begin::Start { scene: Box::new(scene), config: Box::new(config), out })
+        let begin = Begin::Start { scene: Box::new(scene), config: Box::new(config), out };
+        self.spawn(Opening::of(title), begin)
     }
 
     /// Compares and runs two episodes that were started side by side, once both are open.
@@ -258,10 +274,10 @@ impl App {
         }
     }
 
-    /// `out/<scene>-<policy>-<seed>`, with a number behind it if that is taken.
-    fn free_directory(&self, scene: &Scene, config: &EpisodeConfig) -> PathBuf {
+    /// `out/<scene>-<policy>-<seed><suffix>`, with a number behind it if that is taken.
+    fn free_directory(&self, scene: &Scene, config: &EpisodeConfig, suffix: &str) -> PathBuf {
         let plain = crate::driver::default_out(scene, config.policy, config.seed);
-        let name = plain.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = format!("{}{suffix}", plain.file_name().unwrap_or_default().to_string_lossy());
         let taken = |path: &PathBuf| path.exists() || self.begun.contains(path);
         let numbered = (2..).map(|n| self.options.out.join(format!("{name}-{n}")));
         std::iter::once(self.options.out.join(&name)).chain(numbered).find(|path| !taken(path)).unwrap_or(plain)
@@ -283,23 +299,24 @@ impl App {
     fn order(&mut self, order: Order, activity: Activity) {
         let Some(id) = self.model.shown else { return self.tell(Level::Warning, "Open a scene first") };
         match self.order_to(id, order, activity) {
-            Ok(()) => self.model.cursor = self.model.session().map_or(0, Session::steps),
+            Ok(()) => self.model.go_to(self.model.session().map_or(0, Session::steps)),
             Err((level, words)) => self.tell(level, words),
         }
     }
 
     fn order_to(&mut self, id: SessionId, order: Order, activity: Activity) -> Result<(), (Level, &'static str)> {
         let worker = self.workers.get(&id);
-        let worker = worker.ok_or((Level::Warning, "This episode takes no more orders; branch from it to go on"))?;
+        let worker =
+            worker.ok_or((Level::Warning, "This episode takes no more actions; branch from it to continue"))?;
         let session = self.model.session_of_mut(id).ok_or((Level::Warning, "The episode is not open"))?;
         if session.read_only.is_some() {
-            return Err((Level::Warning, "This episode can only be looked at; branch from it to go on"));
+            return Err((Level::Warning, "This episode is read only; branch from it to continue"));
         }
         if session.activity != Activity::Idle {
             return Err((Level::Info, "The episode is busy; cancel first"));
         }
         if session.is_finished() {
-            return Err((Level::Info, "The budget is used up; branch from an earlier step to go on"));
+            return Err((Level::Info, "The budget is used up; branch from an earlier step to continue"));
         }
         session.activity = activity;
         worker.order(order);
@@ -315,7 +332,7 @@ impl App {
                 self.tell(level, words);
             }
         } else {
-            self.model.cursor = self.model.last_step();
+            self.model.go_to(self.model.last_step());
         }
     }
 
@@ -352,18 +369,27 @@ impl App {
         self.model.author.cancel_generating();
     }
 
+    /// Starts an episode that shares the actions up to the cursor. What was decided there, and what was chosen to be looked
+    /// at, holds in it as well.
     fn branch(&mut self) {
         let Some(session) = self.model.session() else { return };
         let (of, steps) = (session.record.clone(), self.model.cursor.min(session.steps()));
+        let kept = Kept {
+            decision: session.decision_after(steps).cloned().map(Arc::new),
+            picked: self.model.picked,
+            view: self.model.view,
+            candidate: self.model.candidate,
+        };
+        let out = self.free_directory(&of.scene, &of.config, &branch_suffix(steps));
         let title = format!("{} from step {steps}", session.title());
-        let out = self.free_directory(&of.scene, &of.config);
-        self.spawn(title, Begin::Branch { of: Box::new(of), steps, out });
+        self.spawn(Opening { kept: Some(kept), ..Opening::of(title) }, Begin::Branch { of: Box::new(of), steps, out });
     }
 
     fn preview(&mut self, push: Push) {
         let Some(session) = self.model.session() else { return };
         let moment = session.moment(self.model.cursor).clone();
         let (of, setup) = ((session.id, moment.step), session.setup.clone());
+        self.asked_preview = Some((of, push));
         let Some(update) = setup.update.clone() else { return };
         self.background.preview.ask(move |_| {
             let belief = moment.belief.belief();
@@ -397,6 +423,20 @@ impl App {
         }
     }
 
+    /// In the layout of pushes, chooses the push of the decision at the cursor where none is chosen, and asks what the chosen
+    /// one would do.
+    pub(super) fn follow_push(&mut self) {
+        let Some(session) = self.model.session().filter(|_| self.model.kept.layout == LayoutKind::Push) else { return };
+        let of = (session.id, self.model.cursor.min(session.steps()));
+        let Some(decision) = session.decision_after(of.1) else { return };
+        let chosen = self.model.candidate.or_else(|| weighed::looked_at_first(decision));
+        let push = chosen.and_then(|at| decision.candidates.get(at)).map(|candidate| candidate.push);
+        self.model.candidate = chosen;
+        if let Some(push) = push.filter(|push| self.asked_preview != Some((of, *push))) {
+            self.preview(push);
+        }
+    }
+
     fn note(&mut self, step: usize, text: String) {
         let Some(session) = self.model.shown.and_then(|id| self.model.session_of_mut(id)) else { return };
         if text.trim().is_empty() {
@@ -420,7 +460,7 @@ impl App {
 
     fn try_scene(&mut self) {
         if !self.model.author.is_sound() {
-            return self.tell(Level::Warning, "The scene has problems; mend what is red first");
+            return self.tell(Level::Warning, "The scene has problems; correct what is red first");
         }
         let scene = self.model.author.scene().clone();
         self.start_scene(scene, self.model.kept.form.policy);

@@ -20,10 +20,13 @@ impl App {
         egui::Panel::top("menus").show(ui, |ui| self.menus(ui, &mut ask));
         egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
         let openings: Vec<_> =
-            self.openings.values().map(|opening| (opening.title.clone(), opening.activity)).collect();
+            self.openings.iter().map(|(id, opening)| (*id, opening.title.clone(), opening.activity)).collect();
         self.parts.clear();
         if self.model.recording.is_some() {
-            egui::Panel::top("recording").show(ui, |ui| self.recording_bar(ui, &mut ask));
+            egui::Panel::top("recording").show(ui, |ui| {
+                self.recording_bar(ui, &mut ask);
+                panels::episode::openings(ui, &openings, &mut ask);
+            });
             self.space_view(ui, frame);
         } else if self.model.kept.layout == LayoutKind::Author {
             egui::CentralPanel::default().show(ui, |ui| panels::author::show(ui, &mut self.model, &mut ask));
@@ -257,8 +260,8 @@ impl App {
                     viewer.play(kind);
                 }
             }
-            let back = if self.model.sessions.is_empty() { "Close" } else { "Back to the episode" };
-            if ui.button(back).on_hover_text("The recording's file stays as it is").clicked() {
+            let back = if self.model.sessions.is_empty() { "Back to the scenes" } else { "Back to the episode" };
+            if ui.button(back).on_hover_text("Closes the recording (Esc); its file stays as it is").clicked() {
                 ask.push(Command::CloseRecording);
             }
         });

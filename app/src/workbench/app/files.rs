@@ -1,12 +1,13 @@
 //! What is read and written: scenes, episodes and recordings that are opened, notes and scenes that are saved, exports.
 
-use super::{App, ChosenFor, Part};
+use super::{App, ChosenFor, Opening, Part};
 use crate::workbench::annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::Dialog;
 use crate::workbench::export;
 use crate::workbench::file_kind::FileKind;
 use crate::workbench::model::LayoutKind;
+use crate::workbench::recording_file::{self, Ending};
 use crate::workbench::session::{Session, SessionId};
 use crate::workbench::threads;
 use crate::workbench::worker::Begin;
@@ -42,30 +43,36 @@ impl App {
     }
 
     fn open_recording(&mut self, path: &Path) {
-        match (&mut self.viewer, path.is_file()) {
-            (_, false) => self.tell(Level::Error, format!("{}: no such file", path.display())),
-            (None, true) => self.tell(Level::Error, format!("{}: recordings need a graphics driver", path.display())),
-            (Some(viewer), true) => {
-                viewer.open_recording(path);
-                self.model.recording = Some(path.to_owned());
-                self.model.browsing = false;
-                if self.model.kept.layout == LayoutKind::Author {
-                    self.model.kept.layout = LayoutKind::Episode;
-                }
-                self.remember(path);
-            }
+        let ending = match recording_file::check(path) {
+            Ok(ending) => ending,
+            Err(words) => return self.tell(Level::Error, format!("{}: {words}", path.display())),
+        };
+        let Some(viewer) = &mut self.viewer else {
+            return self.tell(Level::Error, format!("{}: recordings need a graphics driver", path.display()));
+        };
+        viewer.open_recording(path);
+        self.model.recording = Some(path.to_owned());
+        self.model.browsing = false;
+        if self.model.kept.layout == LayoutKind::Author {
+            self.model.kept.layout = LayoutKind::Episode;
+        }
+        self.remember(path);
+        if let Ending::CutShort(bytes) = ending {
+            let words = format!("is cut short after {bytes} bytes; shown is what comes before");
+            self.tell(Level::Warning, format!("{}: {words}", path.display()));
         }
     }
 
     fn open_episode(&mut self, directory: &Path) {
-        self.remember(directory);
         let wanted = threads::plain(directory);
         let open = self.model.sessions.iter().find(|session| threads::plain(&session.path) == wanted);
         if let Some(id) = open.map(|session| session.id) {
+            self.remember(directory);
             return self.carry_out(Command::Show(id));
         }
         let begin = Begin::Open { path: directory.to_owned(), look_only: self.options.look_only };
-        self.spawn(directory.display().to_string(), begin);
+        let opening = Opening::of(directory.display().to_string());
+        self.spawn(Opening { remember: Some(directory.to_owned()), ..opening }, begin);
     }
 
     /// Opens a scene in the editor; false if it is none, or the editor holds changes.
@@ -93,7 +100,7 @@ impl App {
         if !self.keeps_changes() {
             self.model.author.edit_copy(scene);
         }
-        self.model.kept.layout = LayoutKind::Author;
+        self.lay_out(LayoutKind::Author);
     }
 
     /// Whether the editor holds changes that must not be lost; says so.

@@ -32,6 +32,7 @@ impl App {
         self.picture(ctx);
         self.pair_up();
         self.follow_gain();
+        self.follow_push();
         self.derive();
         self.space();
         self.quitting(ctx);
@@ -65,7 +66,7 @@ impl App {
                 session.moments.push(moment);
                 session.pending = None;
                 if followed {
-                    self.model.cursor = self.model.last_step();
+                    self.model.go_to(self.model.last_step());
                 }
             }
             Event::Failed(words) => {
@@ -82,7 +83,7 @@ impl App {
                 self.workers.remove(&id);
                 if let Some(session) = self.model.session_of_mut(id) {
                     session.activity = Activity::Idle;
-                    session.read_only = Some("its worker broke down".to_owned());
+                    session.read_only = Some("a fault of the program stopped it".to_owned());
                     let (path, steps) = (session.path.clone(), session.steps());
                     self.dialog = Some(Dialog::Broke { id, words, path, steps });
                 } else {
@@ -93,7 +94,10 @@ impl App {
     }
 
     fn opened(&mut self, id: SessionId, opened: Opened) {
-        self.openings.remove(&id);
+        let opening = self.openings.remove(&id);
+        if let Some(path) = opening.as_ref().and_then(|opening| opening.remember.as_ref()) {
+            self.remember(path);
+        }
         let annotations = match Annotations::read(&opened.path) {
             Ok(annotations) => annotations,
             Err(error) => {
@@ -102,7 +106,7 @@ impl App {
             }
         };
         if let Some(reason) = opened.read_only.as_ref().filter(|_| !self.options.look_only) {
-            self.model.toasts.tell(Level::Warning, format!("Opened to look at only: {reason}"));
+            self.model.toasts.tell(Level::Warning, format!("Opened read only: {reason}"));
         }
         let steps = opened.moments.len() - 1;
         self.model.sessions.push(Session {
@@ -111,17 +115,21 @@ impl App {
             record: opened.record,
             setup: opened.setup,
             moments: opened.moments,
-            pending: None,
+            pending: opening.as_ref().and_then(|opening| opening.kept.as_ref()?.decision.clone()),
             activity: Activity::Opening { done: steps, of: steps },
             read_only: opened.read_only,
             annotations,
             unsaved: false,
         });
-        if self.model.kept.layout == LayoutKind::Author {
-            self.model.kept.layout = LayoutKind::Episode;
+        // Only what could be opened takes the place of what was in sight.
+        self.show(id);
+        if let Some(kept) = opening.and_then(|opening| opening.kept) {
+            let model = &mut self.model;
+            (model.picked, model.view, model.candidate) = (kept.picked, kept.view, kept.candidate);
         }
-        self.model.show(id);
-        self.model.cursor = steps;
+        if self.model.kept.layout == LayoutKind::Compare {
+            self.choose_other();
+        }
     }
 
     /// What was made in the background, what tasks have to say, and what was chosen in the system's dialogs.
@@ -137,7 +145,7 @@ impl App {
             self.model.gain_source = Some(source);
         }
         for words in background.broke() {
-            self.model.toasts.tell(Level::Error, format!("A background job broke down: {words}"));
+            self.model.toasts.tell(Level::Error, format!("A computation in the background failed: {words}"));
         }
         for (level, words) in self.tasks.ended() {
             self.model.toasts.tell(level, words);
@@ -174,9 +182,11 @@ impl App {
         }
     }
 
-    /// Shortcuts are taken before the viewer sees them; a text field keeps its keys.
+    /// Shortcuts are taken before the viewer sees them, and mean what is in sight: a text field, an open menu and a question
+    /// keep their keys.
     fn keys(&mut self, ctx: &egui::Context) {
         let (typing, focused) = (ctx.text_edit_focused(), ctx.memory(|memory| memory.focused().is_some()));
+        let menu = egui::Popup::is_any_open(ctx);
         let authoring = self.model.kept.layout == LayoutKind::Author;
         // The longer ones first: a shortcut also answers to more modifiers than its own.
         let mut entries: Vec<_> = MenuCommand::all().filter_map(|entry| Some((entry, entry.shortcut()?))).collect();
@@ -186,7 +196,10 @@ impl App {
             // Undo and the keys without a modifier belong to whatever is typed in, and the editor has its own.
             let edits =
                 matches!(entry, MenuCommand::Undo | MenuCommand::Redo | MenuCommand::Duplicate | MenuCommand::Delete);
-            if (plain && (typing || self.dialog.is_some())) || (edits && (typing || authoring)) {
+            if self.dialog.is_some() && entry != MenuCommand::Quit {
+                continue;
+            }
+            if (plain && (typing || menu)) || (edits && (typing || authoring)) {
                 continue;
             }
             if plain && entry != MenuCommand::Cancel && entry != MenuCommand::Shortcuts && authoring {
@@ -196,13 +209,34 @@ impl App {
             if keys.logical_key == egui::Key::Enter && focused {
                 continue;
             }
-            let back = entry == MenuCommand::Cancel && self.model.browsing && !self.model.sessions.is_empty();
-            let available = back || entry.is_available(&self.model);
+            let back = if entry == MenuCommand::Cancel { self.way_back() } else { None };
+            let available = back.is_some() || entry.is_available(&self.model);
             // The viewer has meanings of its own for some of them.
             let taken = (available || !plain) && ctx.input_mut(|input| input.consume_shortcut(&keys));
             if taken && available {
-                self.carry_out(if back { Command::Browse(false) } else { Command::Menu(entry) });
+                self.carry_out(back.unwrap_or(Command::Menu(entry)));
             }
+        }
+        // Left and right scrub the clock, unless something has the focus that they move in.
+        for (key, entry) in
+            [(egui::Key::ArrowLeft, MenuCommand::StepBack), (egui::Key::ArrowRight, MenuCommand::StepForward)]
+        {
+            let free = !typing && !focused && !menu && self.dialog.is_none() && self.model.shows_episode();
+            if free
+                && ctx.input_mut(|input| input.consume_key(egui::Modifiers::NONE, key))
+                && entry.is_available(&self.model)
+            {
+                self.carry_out(Command::Menu(entry));
+            }
+        }
+    }
+
+    /// Where Escape goes back to from what is in an episode's place.
+    fn way_back(&self) -> Option<Command> {
+        if self.model.recording.is_some() {
+            Some(Command::CloseRecording)
+        } else {
+            (self.model.browsing && !self.model.sessions.is_empty()).then_some(Command::Browse(false))
         }
     }
 
@@ -264,19 +298,7 @@ impl App {
         let place = self.parts.iter().find(|(part, _)| *part == Part::Space).map(|(_, rect)| rect.aspect_ratio());
         let Some(aspect) = place.filter(|aspect| aspect.is_finite()) else { return };
         let model = &self.model;
-        let side = |session: &Session| {
-            let moment = session.moment(model.cursor).clone();
-            let step = moment.step;
-            Side {
-                id: session.id,
-                shelf: session.record.scene.shelf,
-                setup: session.setup.clone(),
-                before: step.checked_sub(1).map(|before| session.moment(before).clone()),
-                after: session.moments.get(step + 1).cloned(),
-                decision: session.decision_after(step).cloned().map(Arc::new),
-                moment,
-            }
-        };
+        let side = |session: &Session| Side::of(session, model.cursor);
         let kept = &model.kept;
         let motion_s =
             model.session().and_then(|session| model.panels.motion_s((session.id, model.cursor.min(session.steps()))));

@@ -1,13 +1,15 @@
 //! What only happens when something breaks, driven through the window. The rest is tested from outside, in `tests/`.
 
-use super::{App, Options, Part};
+use super::{App, FormOptions, Options, Part};
 use crate::workbench::command::Command;
 use crate::workbench::dialog::Dialog;
-use crate::workbench::model::LayoutKind;
+use crate::workbench::model::{LayoutKind, StartForm};
 use crate::workbench::session::Activity;
 use crate::workbench::worker::Order;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use nudge_core::belief::CLASSICAL;
+use nudge_core::camera::NoiseModel;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -18,7 +20,8 @@ fn window(folder: &Path, budget: usize) -> Harness<'static, App> {
         .with_size([1440.0, 900.0])
         .build_eframe(move |cc| App::without_viewer(&cc.egui_ctx, options.clone()));
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/demo/first-look.toml");
-    harness.state_mut().model.kept.form.budget = budget;
+    let form = &mut harness.state_mut().model.kept.form;
+    *form = StartForm { budget, ..form.clone().with_belief(CLASSICAL) };
     harness.state_mut().ask(Command::Open(scene));
     wait(&mut harness);
     harness
@@ -52,6 +55,38 @@ fn wait(harness: &mut Harness<'_, App>) {
         std::thread::sleep(Duration::from_millis(5));
     }
     harness.run_steps(3);
+}
+
+/// What was chosen before the window opened, and what the form says, is what episodes are started with.
+#[test]
+fn views_and_noise_of_the_command_line_reach_the_episode() {
+    let folder = tempfile::tempdir().expect("folder");
+    let form = FormOptions {
+        views: Some("real75".to_owned()),
+        noise: Some(Some(NoiseModel::STANDARD)),
+        budget: Some(1),
+        ..FormOptions::default()
+    };
+    let open = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/demo/first-look.toml");
+    let options = Options { out: folder.path().join("out"), form, open: Some(open), ..Options::default() };
+    let mut harness = Harness::builder()
+        .with_size([1440.0, 900.0])
+        .build_eframe(move |cc| App::without_viewer(&cc.egui_ctx, options.clone()));
+    wait(&mut harness);
+    let session = harness.state().model.session().expect("open");
+    let config = &session.record.config;
+    assert_eq!((config.views.as_str(), config.noise, config.budget), ("real75", Some(NoiseModel::STANDARD), 1));
+    assert_eq!(session.setup.views.views.len(), 75);
+    let sees = |text: &str| harness.query_all_by_label(text).next().is_some();
+    assert!(sees("real75") && sees("standard"), "told beside the policy");
+    // A file that is none is told, and nothing is left over.
+    harness.state_mut().model.kept.form.views = "nowhere.toml".to_owned();
+    let scene = harness.state().model.kept.form.scene.clone().expect("a scene");
+    harness.state_mut().ask(Command::Open(scene));
+    wait(&mut harness);
+    assert_eq!(harness.state().model.sessions.len(), 1);
+    let left = std::fs::read_dir(folder.path().join("out")).expect("listed").count();
+    assert_eq!(left, 1, "only the first episode has a directory");
 }
 
 #[test]
@@ -104,7 +139,7 @@ fn an_episode_of_another_version_is_shown_as_it_is_filed() {
     // As if another version had written it.
     let path = reopened(&mut harness, |record| record["steps"][0]["scores"]["semantic_miou"] = 0.125.into());
     let session = harness.state().model.session().expect("shown all the same");
-    let reason = session.read_only.as_deref().expect("to look at only");
+    let reason = session.read_only.as_deref().expect("read only");
     assert!(reason.contains("step 1: scores.semantic_miou: 0.125 in the log"), "{reason}");
     assert_eq!((session.path.clone(), session.steps()), (path, 2));
     assert_eq!(session.moments[1].scores.semantic_miou, 0.125);
@@ -137,9 +172,30 @@ fn panels_stay_as_wide_as_they_were_made() {
 fn an_episode_of_the_networks_opens_in_a_build_without_them() {
     let folder = tempfile::tempdir().expect("folder");
     let mut harness = window(folder.path(), 1);
-    reopened(&mut harness, |record| record["belief"] = "cnabu".into());
+    reopened(&mut harness, |record| {
+        record["belief"] = "cnabu".into();
+        // As programs wrote it that did not tell what made an episode.
+        record.as_object_mut().expect("an object").remove("made_by");
+    });
     let session = harness.state().model.session().expect("shown all the same");
-    let reason = session.read_only.as_deref().expect("to look at only");
+    let reason = session.read_only.as_deref().expect("read only");
     assert!(reason.contains("shown is what it holds"), "{reason}");
     assert_eq!((session.steps(), session.setup.update.is_some()), (1, nudge_core::cnabu::AVAILABLE));
+}
+
+#[test]
+fn an_episode_of_other_weights_opens_to_be_looked_at_and_says_so() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 2);
+    reopened(&mut harness, |record| {
+        record["belief"] = "cnabu".into();
+        record["made_by"]["weights"] = serde_json::json!({ "sigma_o": "0".repeat(64), "sigma_m": "1".repeat(64) });
+    });
+    let session = harness.state().model.session().expect("shown all the same");
+    let reason = session.read_only.as_deref().expect("to look at only");
+    assert!(reason.contains("shown is what it holds") && reason.lines().count() == 1, "{reason}");
+    let is_told = reason.contains("the weights sigma_o were 000000000000, now they are ");
+    assert_eq!(is_told, nudge_core::cnabu::AVAILABLE, "{reason}");
+    // Nothing is repeated with weights that it was not made with, and no push predicted.
+    assert!(session.steps() == 2 && session.setup.update.is_none());
 }

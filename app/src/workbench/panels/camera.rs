@@ -54,7 +54,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model) {
     heading(
         ui,
         format!("Camera: view {} at {when}", image.view.0),
-        "What the robot's camera saw; the belief is made of this",
+        "What the robot's camera saw; the belief was updated with it",
     );
     let gap = 10.0;
     let columns = if ui.available_width() < 300.0 { 1 } else { 2 };

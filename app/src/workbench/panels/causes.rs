@@ -1,12 +1,12 @@
 //! Which steps changed a voxel or a floor cell, and by what: looks that saw it, pushes that swept it or were predicted
-//! to change it.
+//! to change it, and networks that changed it without either.
 
 use super::floor::in_window;
 use super::words;
 use crate::colors;
 use crate::workbench::model::Picked;
 use crate::workbench::session::{Moment, Session};
-use nudge_core::belief::beta_mean;
+use nudge_core::belief::{CNABU, beta_mean};
 use nudge_core::camera::UNOBSERVED;
 use nudge_core::episode::StepOutcome;
 use nudge_core::grid::{Grid, VoxelSet};
@@ -15,12 +15,16 @@ use nudge_core::scene::{CLASS_COUNT, ClassId};
 
 /// A predicted probability of change below this is not worth a line.
 const WORTH_TELLING: f32 = 0.01;
+/// A change of a probability above this has a line, whatever made it.
+const CHANGED: f32 = 0.02;
 
 /// A step that changed what was asked about.
 pub struct Change {
     /// Its number, counted from 1.
     pub step: usize,
-    /// What did it, in words.
+    /// What was done, in words.
+    pub action: String,
+    /// What that did to it, in words.
     pub causes: Vec<String>,
     /// Before and after: a voxel's probability, a cell's certainty.
     pub from_to: [f32; 2],
@@ -55,41 +59,45 @@ struct Subject<'a> {
 impl Subject<'_> {
     fn change(&self, before: &Moment, after: &Moment) -> Option<Change> {
         let outcome = after.outcome.as_ref()?;
+        let number = |moment: &Moment| match self.voxel {
+            Some(voxel) => beta_mean(moment.belief.voxel(voxel)),
+            None => certainty(moment, self.cell),
+        };
+        let from_to = [number(before), number(after)];
         let mut causes = self.seen(outcome);
         causes.extend(self.pushed(outcome));
+        if causes.is_empty() && (from_to[1] - from_to[0]).abs() > CHANGED {
+            causes.push(self.unseen(outcome));
+        }
         let labels = [before, after].map(|moment| moment.truth.labels.get(self.cell).copied());
         if let [before, Some(label)] = labels
             && before != Some(label)
         {
             causes.push(format!("what stands there became {}", self.class(label)));
         }
-        let number = |moment: &Moment| match self.voxel {
-            Some(voxel) => beta_mean(moment.belief.voxel(voxel)),
-            None => certainty(moment, self.cell),
+        let action = match outcome.record.action {
+            Action::Look { view } => format!("look from view {}", view.0),
+            Action::Push(_) => "push".to_owned(),
         };
-        let from_to = [number(before), number(after)];
-        (!causes.is_empty()).then_some(Change { step: after.step, causes, from_to })
+        (!causes.is_empty()).then_some(Change { step: after.step, action, causes, from_to })
     }
 
     /// What a look saw of it.
     fn seen(&self, outcome: &StepOutcome) -> Vec<String> {
-        let (Some(observation), Action::Look { view }) = (&outcome.observation, outcome.record.action) else {
-            return Vec::new();
-        };
+        let Some(observation) = &outcome.observation else { return Vec::new() };
         let mut causes = Vec::new();
-        let from = format!("from view {}", view.0);
         if let Some(voxel) = self.voxel {
             if observation.free.contains(voxel) {
-                causes.push(format!("seen free {from}"));
+                causes.push("a ray passed it (free)".to_owned());
             } else if observation.occupied.contains(voxel) {
-                causes.push(format!("seen occupied {from}"));
+                causes.push("a ray met it (occupied)".to_owned());
             }
             return causes;
         }
         let count = |set: &VoxelSet| self.grid.column(self.cell).filter(|voxel| set.contains(*voxel)).count();
         let (free, occupied) = (count(&observation.free), count(&observation.occupied));
         if free + occupied > 0 {
-            causes.push(format!("{free} voxels seen free, {occupied} occupied {from}"));
+            causes.push(format!("rays passed {free} voxels (free) and met {occupied} (occupied)"));
         }
         let label = observation.labels.get(self.cell).copied().unwrap_or(UNOBSERVED);
         if usize::from(label) < CLASS_COUNT {
@@ -107,17 +115,26 @@ impl Subject<'_> {
                 None => self.grid.column(self.cell).any(|voxel| push.swept.contains(voxel)),
             };
             if swept {
-                causes.push("push swept it".to_owned());
+                causes.push("swept by the tool".to_owned());
             }
         }
         if let Some(prediction) = &outcome.prediction {
             let at = in_window(&prediction.window, &self.grid, self.cell);
             let change = at.and_then(|at| prediction.change.get(at)).copied().unwrap_or(0.0);
             if change >= WORTH_TELLING {
-                causes.push(format!("predicted change {}", words::probability(change)));
+                causes.push(format!("predicted to change with probability {}", words::probability(change)));
             }
         }
         causes
+    }
+
+    /// What changed it although the step neither saw nor moved it: the belief update itself.
+    fn unseen(&self, outcome: &StepOutcome) -> String {
+        let update = if self.session.record.config.belief == CNABU { "network" } else { "belief update" };
+        match outcome.record.action {
+            Action::Look { .. } => format!("{update}, not seen"),
+            Action::Push(_) => format!("{update}, neither swept nor predicted to change"),
+        }
     }
 
     fn class(&self, label: u8) -> String {

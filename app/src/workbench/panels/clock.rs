@@ -1,7 +1,7 @@
 //! The clock at the bottom: the step that everything is shown at, and where it is written.
 
 use crate::workbench::command::{Command, MenuCommand};
-use crate::workbench::model::Model;
+use crate::workbench::model::{LayoutKind, Model};
 use nudge_core::plan::Action;
 use re_viewer::external::egui;
 
@@ -26,13 +26,20 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
             ui.weak("No episode is open");
             return;
         };
+        if !model.shows_episode() {
+            let authoring = model.kept.layout == LayoutKind::Author;
+            let way = if authoring { "choose a layout at the top right" } else { "press Esc" };
+            let words = format!("{} is open: {way} to see it", session.title());
+            ui.add(egui::Label::new(egui::RichText::new(words).weak()).truncate());
+            return;
+        }
         ui.label("step");
         let branch = MenuCommand::Branch;
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let path = session.path.display().to_string();
             let (dot, words) = match &session.read_only {
                 None => ("●", "Every step is written here as it is done".to_owned()),
-                Some(reason) => ("○", format!("Can only be looked at: {reason}")),
+                Some(reason) => ("○", format!("Read only: {reason}")),
             };
             ui.weak(&path).on_hover_text(&words);
             let color =

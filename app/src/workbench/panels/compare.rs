@@ -105,7 +105,8 @@ fn header(ui: &mut Ui, model: &Model, a: &Session, b: Option<&Session>, ask: &mu
         let combo = combo.show_ui(ui, |ui| {
             ui.selectable_value(&mut chosen, None, "none");
             for session in model.sessions.iter().filter(|session| session.id != a.id) {
-                ui.selectable_value(&mut chosen, Some(session.id), format!("{} ({})", session.title(), session.id.0));
+                let title = format!("{} ({}/{})", session.title(), session.steps(), session.record.config.budget);
+                ui.selectable_value(&mut chosen, Some(session.id), title);
             }
         });
         combo.response.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::ComboBox, true, "Compare with"));
@@ -119,7 +120,7 @@ fn header(ui: &mut Ui, model: &Model, a: &Session, b: Option<&Session>, ask: &mu
 /// Where the two part, in words, with a button to go there.
 fn parting(ui: &mut Ui, model: &Model, a: &Session, b: &Session, ask: &mut Vec<Command>) {
     if a.record.scene != b.record.scene {
-        ui.weak("The two episodes are about different scenes");
+        ui.weak("A and B are episodes of different scenes");
     }
     if model.cursor > b.steps() {
         ui.weak(format!("B ends after step {}; its last state is shown", b.steps()));
@@ -138,7 +139,7 @@ fn parting(ui: &mut Ui, model: &Model, a: &Session, b: &Session, ask: &mut Vec<C
         })
     };
     ui.horizontal_wrapped(|ui| {
-        ui.label(format!("They part at step {step}: A {}, B {}", does(a), does(b)));
+        ui.label(format!("First difference at step {step}: A {}, B {}", does(a), does(b)));
         let before = step - 1;
         let hint = "Goes to the state before the first step at which the actions differ";
         if ui.small_button(format!("Go to step {before}")).on_hover_text(hint).clicked() {
@@ -157,7 +158,7 @@ fn scores(ui: &mut Ui, model: &Model, a: &Session, b: &Session) {
         ui.end_row();
         for series in SERIES {
             let (a, b) = ((series.value)(&a), (series.value)(&b));
-            ui.label(RichText::new(series.title).small());
+            ui.label(RichText::new(series.title).small()).on_hover_text(series.hint);
             for value in [a, b, a - b] {
                 ui.label(words::figure(words::significant(value, 3)));
             }
@@ -254,7 +255,7 @@ fn floor(
                 "Difference of the likeliest class's probability, −1 to 1; hatched where the likeliest class differs",
             );
             if derived[0].belief.grid != derived[1].belief.grid {
-                ui.weak("The two episodes have different grids");
+                ui.weak("A and B have grids of different sizes: there is no difference to show");
                 return;
             }
             let key = Shown::Difference(derived.map(|derived| derived.of));
@@ -268,9 +269,9 @@ fn floor(
             });
             let texts = Bar {
                 name: "difference of certainty",
-                ends: ["B surer".to_owned(), "A surer".to_owned()],
-                unit: "−1   0   +1",
-                hint: "Certainty of A minus that of B",
+                ends: ["−1: B more certain".to_owned(), "+1: A".to_owned()],
+                unit: "probability",
+                hint: "Certainty of A minus that of B: difference of the likeliest class's probability",
             };
             legend::bar(ui, &texts, |t| Colormap::Diverging.rgb(t));
         }

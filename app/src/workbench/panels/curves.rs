@@ -8,7 +8,9 @@ use crate::workbench::model::{LayoutKind, Model};
 use crate::workbench::session::Session;
 use egui_plot::{AxisHints, GridMark, Line, LineStyle, MarkerShape, Plot, PlotPoint, Points, VLine};
 use nudge_core::plan::Action;
-use re_viewer::external::egui::{Color32, CursorIcon, Rangef, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2};
+use re_viewer::external::egui::{
+    Color32, CursorIcon, Rangef, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2,
+};
 
 /// The scores between 0 and 1 that are drawn.
 const SHARES: [&str; 3] = ["occupancy_iou", "occupied_iou", "semantic_miou"];
@@ -156,7 +158,7 @@ impl Curves<'_> {
                 let (rect, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
                 let ink = legend::line_ink(ui, series.rgb);
                 ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(2.0, ink));
-                ui.label(RichText::new(series.title).small());
+                ui.label(RichText::new(series.title).small()).on_hover_text(series.hint);
                 let value = match self.other {
                     None => at(self.session, series),
                     Some(other) => format!("A {} B {}", at(self.session, series), at(other, series)),

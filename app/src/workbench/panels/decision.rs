@@ -86,56 +86,76 @@ fn header(ui: &mut Ui, session: &Session, cursor: usize) {
     });
 }
 
+/// A bar of the comparison: its name, its value in nats, its shade, whether it decided, and what it is.
+struct Compared {
+    name: &'static str,
+    nats: f32,
+    shade: f32,
+    strong: bool,
+    hint: String,
+}
+
+/// What was compared, in the order of the bars: looking, the threshold where a push has to reach another one, and the best
+/// push with what it disturbs.
+fn compared(decision: &Decision, planner: &PlannerSettings) -> Vec<Compared> {
+    let (counted, look) = (planner.counted, decision.igv);
+    let looks = matches!(decision.action, Action::Look { .. });
+    let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore);
+    let mut bars = vec![Compared {
+        name: "Look (IGV)",
+        nats: look,
+        shade: 0.85,
+        strong: ruled && looks,
+        hint: format!("IGV, nats: {}", counted.of_looks()),
+    }];
+    if !weighs_pushes(decision) {
+        return bars;
+    }
+    let needed = planner.asked_of_pushes(look);
+    if needed != look {
+        let hint = if needed > planner.patience * look {
+            format!(
+                "Threshold: a push has to be worth {} at least, whatever looking gains",
+                words::nats(planner.push_floor)
+            )
+        } else {
+            format!("Threshold: a push has to be worth {} times what looking gains (patience)", planner.patience)
+        };
+        bars.push(Compared { name: "Threshold", nats: needed, shade: 0.7, strong: ruled && looks, hint });
+    }
+    let hint = format!("IGM, nats: {}", counted.of_pushes());
+    bars.push(Compared { name: "Push (IGM)", nats: decision.igm, shade: 0.5, strong: ruled && !looks, hint });
+    let hint = weighed::DISTURBANCE.to_owned();
+    bars.push(Compared { name: "Push: γ·Reg", nats: planner.gamma * decision.reg, shade: 0.1, strong: false, hint });
+    bars
+}
+
+/// Whether the best push was compared with looking.
+fn weighs_pushes(decision: &Decision) -> bool {
+    decision.best_push.is_some() && decision.igm != 0.0
+}
+
 /// Looking against pushing, as bars on one scale, and what follows.
 fn verdict(ui: &mut Ui, decision: &Decision, config: &EpisodeConfig) {
     let planner = &config.planner;
-    let (gamma, patience) = (planner.gamma, planner.patience);
-    let (look, push) = (decision.igv, decision.igm + gamma * decision.reg);
-    let weighed = decision.best_push.is_some() && decision.igm != 0.0;
-    // What is compared: looking counts patience times where a push has to promise more, and as much as it has to at least.
-    let asked = if weighed { planner.asked_of_pushes(look) } else { patience * look };
-    let is_floor = asked > patience * look;
-    let igv = match (is_floor, patience == 1.0) {
-        (true, _) => "floor".to_owned(),
-        (false, true) => "IGV".to_owned(),
-        (false, false) => format!("{patience}·IGV"),
-    };
-    let scale = asked.max(decision.igm).max(1e-6);
-    let looks = matches!(decision.action, Action::Look { .. });
-    let bar = |ui: &mut Ui, name: &str, value: f32, shade: f32, strong: bool, hint: &str| {
+    let bars = compared(decision, planner);
+    let scale = bars.iter().map(|bar| bar.nats.abs()).filter(|nats| nats.is_finite()).fold(1e-6, f32::max);
+    for Compared { name, nats, shade, strong, hint } in bars {
         let bar = spark::Bar {
             name: name.to_owned(),
-            share: value.abs() / scale,
-            value: words::nats(value),
+            share: nats.abs() / scale,
+            value: words::nats(nats),
             colour: super::legend::ink(Colormap::Cividis.rgb(shade)),
             strong,
         };
-        spark::bar(ui, &bar, if patience == 1.0 { 74.0 } else { 88.0 }, 72.0).on_hover_text(hint);
-    };
-    let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore);
-    let (nats, of) = (words::nats(look), planner.counted.of_looks());
-    let hint = if is_floor {
-        format!("IGV: {of}, {nats}; a push has to promise {} at least", words::nats(asked))
-    } else if patience == 1.0 {
-        format!("IGV: {of}, nats")
-    } else {
-        format!("IGV: {of}, {nats}; a push has to promise {patience} times that")
-    };
-    bar(ui, &format!("Look: {igv}"), asked, 0.85, ruled && looks, &hint);
-    if weighed {
-        bar(
-            ui,
-            "Push: IGM",
-            decision.igm,
-            0.5,
-            ruled && !looks,
-            &format!("IGM: {}, nats", planner.counted.of_pushes()),
-        );
-        let reg = gamma * decision.reg;
-        let hint = "What the push would blur, at most 0: Reg = min(0, H(labels) − H(labels, predicted))";
-        bar(ui, "γ·Reg", reg, 0.1, false, hint);
-        let text = format!("{igv} − (IGM + γ·Reg) = {}", words::nats(asked - push));
-        ui.label(RichText::new(text).small()).on_hover_text("The rule looks if this is above 0, and else pushes");
+        spark::bar(ui, &bar, 82.0, 72.0).on_hover_text(hint);
+    }
+    if weighs_pushes(decision) {
+        let needed = planner.asked_of_pushes(decision.igv);
+        let name = if needed == decision.igv { "IGV" } else { "Threshold" };
+        let margin = needed - (decision.igm + planner.gamma * decision.reg);
+        let text = format!("{name} − (IGM + γ·Reg) = {}", words::nats(margin));
+        ui.label(RichText::new(text).small()).on_hover_text("The policy looks if this is above 0, and else pushes");
     } else {
         ui.label(RichText::new("No push was weighed").small().weak());
     }
@@ -152,13 +172,17 @@ fn because(reason: Reason, policy: PolicyKind, planner: &PlannerSettings) -> Str
         count => format!("nothing is pushed in the {which} {count} steps"),
     };
     match reason {
-        Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore | Reason::MapComplete => {
-            words::reason(reason).to_owned()
-        }
+        Reason::LookTellsMore
+        | Reason::PushTellsLittle
+        | Reason::PushTellsMore
+        | Reason::PushReveals
+        | Reason::MapComplete => words::reason(reason).to_owned(),
         Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
         Reason::TooEarly => steps("first", planner.quiet_steps),
         Reason::LastStep => steps("last", planner.closing_steps),
-        Reason::JustPushed if policy == PolicyKind::Mem && planner.closing_steps > 1 => {
+        Reason::JustPushed
+            if matches!(policy, PolicyKind::Mem | PolicyKind::ClairvoyantPush) && planner.closing_steps > 1 =>
+        {
             format!("{} looks follow a push before the next one", planner.closing_steps)
         }
         Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
@@ -184,7 +208,8 @@ fn views(
     } else {
         let used = weighed::used_views(&session.record, model.cursor);
         let rows = weighed::view_rows(decision, &session.setup.views, &used, model.view);
-        let table = table::show(ui, "views", &weighed::VIEW_COLUMNS, rows, &mut state.views, 220.0);
+        let columns = weighed::view_columns(session.record.config.planner.counted);
+        let table = table::show(ui, "views", &columns, rows, &mut state.views, 220.0);
         if let Some(view) = table.over {
             touched.over = Some(Hovered::View(ViewId(view as u16)));
         }
@@ -245,7 +270,8 @@ pub fn push_table(
         ui.weak("No push is feasible here");
         table::Touched::default()
     } else {
-        table::show(ui, "pushes", &weighed::PUSH_COLUMNS, rows, sort, height)
+        let columns = weighed::push_columns(session.record.config.planner.counted);
+        table::show(ui, "pushes", &columns, rows, sort, height)
     };
     if refused > 0 {
         ui.checkbox(rejected, RichText::new(format!("List all, with {refused} rejected")).small())
@@ -314,5 +340,21 @@ mod tests {
         let said = |policy| because(Reason::JustPushed, policy, &planner);
         assert_eq!(said(PolicyKind::Mem), "4 looks follow a push before the next one");
         assert_eq!(said(PolicyKind::Saturation), "nothing is pushed right after a push");
+    }
+
+    #[test]
+    fn what_looking_gains_is_not_shown_as_a_multiple_of_it() {
+        let mut decision = crate::workbench::fixture::session(1).moments[4].decision().expect("step 4").clone();
+        (decision.igv, decision.igm, decision.reg, decision.best_push) = (300.0, 400.0, -50.0, Some(0));
+        let bars = |patience, push_floor| -> Vec<(&str, f32)> {
+            let planner = PlannerSettings { patience, push_floor, ..PlannerSettings::default() };
+            compared(&decision, &planner).iter().map(|bar| (bar.name, bar.nats)).collect()
+        };
+        let (look, push) = (("Look (IGV)", 300.0), [("Push (IGM)", 400.0), ("Push: γ·Reg", -10.0)]);
+        assert_eq!(bars(1.0, 0.0), [look, push[0], push[1]], "the rule of the paper compares IGV itself");
+        assert_eq!(bars(10.0, 2000.0), [look, ("Threshold", 3000.0), push[0], push[1]]);
+        assert_eq!(bars(1.0, 2000.0), [look, ("Threshold", 2000.0), push[0], push[1]]);
+        let planner = PlannerSettings { patience: 10.0, push_floor: 5000.0, ..PlannerSettings::default() };
+        assert!(compared(&decision, &planner)[1].hint.contains("5000 nats at least"));
     }
 }

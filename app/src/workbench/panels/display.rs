@@ -13,7 +13,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
     let most = model
         .gain_source
         .as_ref()
-        .map_or("most".to_owned(), |source| format!("{} and more", words::significant(f64::from(source.top), 2)));
+        .map_or("largest".to_owned(), |source| format!("{} and more", words::significant(f64::from(source.top), 2)));
     let display = &mut model.kept.display;
     if layout == LayoutKind::Gains {
         ui.horizontal(|ui| {
@@ -36,12 +36,12 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         shown.response.on_hover_text("What the colour of a voxel says");
         let banded = !matches!(display.colour_by, ColourBy::Error | ColourBy::Change);
         if banded {
-            ui.label("band");
+            ui.label("probability");
             range(ui, &mut display.band, 0.0..=1.0, 0.01, "", "probability");
         }
         let count = egui::RichText::new(format!("{drawn} voxels")).weak();
         ui.add(egui::Label::new(count).extend())
-            .on_hover_text("Drawn; only the surface of what is inside the band shows");
+            .on_hover_text("Voxels that are drawn: the surface of those in the chosen range of probability");
     });
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
@@ -62,7 +62,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         }
         ui.weak("m");
         let whole = display.slice_m == EVERYWHERE_M;
-        let button = egui::Button::new("Whole").small();
+        let button = egui::Button::new("Whole shelf").small();
         if ui.add_enabled(!whole, button).on_hover_text("Show the whole belief again, no slice of it").clicked() {
             display.slice_m = EVERYWHERE_M;
         }
@@ -72,7 +72,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         ui.checkbox(&mut display.views, "views").on_hover_text("The candidate views as frusta, coloured by gain");
         ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
         if layout != LayoutKind::Compare {
-            let hint = "The arm where the step had it, and the way of its tip";
+            let hint = "The arm where the step left it, and the path of its tip";
             ui.checkbox(&mut display.robot, "arm").on_hover_text(hint);
         }
         ui.separator();
@@ -80,9 +80,9 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         // The views beside it that show a difference have a scale of their own.
         if matches!(layout, LayoutKind::Compare | LayoutKind::Push) {
             let (name, unit) = if layout == LayoutKind::Push {
-                ("predicted minus now", "difference")
+                ("predicted minus now", "difference of probability")
             } else {
-                ("A minus B", "A − B")
+                ("A minus B", "difference of probability, A − B")
             };
             scale(ui, Colormap::Diverging, name, ["−1", "+1"], unit);
         }
@@ -114,7 +114,7 @@ fn key(ui: &mut egui::Ui, by: ColourBy) {
         }
         ColourBy::Error => {
             let entries: [(Rgb, &str); 3] = [
-                ([226, 228, 232], "right"),
+                ([226, 228, 232], "correct"),
                 (colors::MISSED_RGB, "missed"),
                 (colors::HALLUCINATED_RGB, "hallucinated"),
             ];

@@ -1,11 +1,11 @@
 //! The episode at the left: its scene, how it is run, what can be done next, and the other open episodes.
 
-use crate::driver::{BELIEFS, belief_update};
+use crate::driver::{BELIEFS, belief_title, belief_update};
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
-use crate::workbench::session::{Activity, Session};
-use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
-use nudge_core::push::PushSampler;
+use crate::workbench::session::{Activity, Session, SessionId};
+use nudge_core::camera::{NoiseModel, ViewArray};
+use nudge_core::plan::{Place, PlannerSettings, PolicyKind, SETTINGS, Setting, Values};
 use re_viewer::external::egui;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -17,8 +17,8 @@ static MISSING: LazyLock<BTreeMap<&str, String>> = LazyLock::new(|| {
 });
 
 /// Draws the episodes that are being opened, each with its progress.
-pub fn openings(ui: &mut egui::Ui, openings: &[(String, Activity)], ask: &mut Vec<Command>) {
-    for (title, activity) in openings {
+pub fn openings(ui: &mut egui::Ui, openings: &[(SessionId, String, Activity)], ask: &mut Vec<Command>) {
+    for (id, title, activity) in openings {
         ui.label(format!("Opening {title}"));
         match activity {
             Activity::Opening { done, of } if *of > 0 => {
@@ -28,8 +28,9 @@ pub fn openings(ui: &mut egui::Ui, openings: &[(String, Activity)], ask: &mut Ve
                 ui.add(egui::Spinner::new());
             }
         }
-        if ui.button("Cancel opening").on_hover_text("Stop repeating its log; its directory stays as it is").clicked() {
-            ask.push(Command::Cancel);
+        let hint = "Stop repeating its actions; its directory stays as it is";
+        if ui.button("Cancel opening").on_hover_text(hint).clicked() {
+            ask.push(Command::CancelOpening(*id));
         }
         ui.separator();
     }
@@ -57,15 +58,20 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
     ui.label(format!("{} objects, {hidden} hidden", scene.objects.len())).on_hover_text(if hidden == 0 {
         "Every object shows in at least one of the candidate views".to_owned()
     } else {
-        format!("No candidate view shows 25 pixels of: {}", session.setup.hidden.join(", "))
+        format!("No candidate view shows 25 pixels or more of: {}", session.setup.hidden.join(", "))
     });
+    let mut facts = vec![
+        ("policy", config.policy.to_string()),
+        ("belief", belief_title(&config.belief).to_owned()),
+        ("seed", config.seed.to_string()),
+        ("budget", format!("{} actions", config.budget)),
+    ];
+    // What is as it mostly is takes no room.
+    let usual = StartForm::default();
+    facts.extend((config.views != usual.views).then(|| ("views", config.views.clone())));
+    facts.extend((config.noise != usual.noise).then(|| ("noise", NoiseModel::name_of(config.noise))));
     egui::Grid::new("config").num_columns(2).spacing([10.0, 2.0]).show(ui, |ui| {
-        for (name, value) in [
-            ("policy", config.policy.to_string()),
-            ("belief", config.belief.clone()),
-            ("seed", config.seed.to_string()),
-            ("budget", format!("{} actions", config.budget)),
-        ] {
+        for (name, value) in facts {
             ui.weak(name);
             ui.monospace(value);
             ui.end_row();
@@ -92,7 +98,7 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
     let (steps, budget) = (session.steps(), session.record.config.budget);
     let doing = match session.activity {
         Activity::Idle if session.is_finished() => "the budget is used up",
-        Activity::Idle if session.read_only.is_some() => "to look at only",
+        Activity::Idle if session.read_only.is_some() => "read only",
         Activity::Idle if session.pending.is_some() => "decided",
         Activity::Idle => "ready",
         Activity::Opening { .. } => "opening",
@@ -161,15 +167,14 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
         ui.end_row();
         let label = ui.label("belief");
         egui::ComboBox::from_id_salt("belief")
-            .selected_text(&form.belief)
+            .selected_text(belief_title(&form.belief))
             .show_ui(ui, |ui| {
                 for belief in &BELIEFS {
                     let missing = MISSING.get(belief);
-                    let choice = egui::Button::selectable(form.belief == *belief, *belief);
+                    let choice = egui::Button::selectable(form.belief == *belief, belief_title(belief));
                     let choice = ui.add_enabled(missing.is_none(), choice);
                     if choice.on_disabled_hover_text(missing.map_or("", String::as_str)).clicked() {
-                        form.belief = (*belief).to_owned();
-                        form.planner = form.planner.counting(Counted::of_belief(belief));
+                        *form = form.clone().with_belief(belief);
                     }
                 }
             })
@@ -187,126 +192,120 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
             .labelled_by(label.id)
             .on_hover_text("Seed of every random choice, any whole number from 0");
         ui.end_row();
-        let label = ui.label("gain of");
-        egui::ComboBox::from_id_salt("gain of")
-            .selected_text(gain_of(form.planner.counted))
-            .show_ui(ui, |ui| {
-                for counted in Counted::ALL {
-                    if ui.selectable_label(form.planner.counted == counted, gain_of(counted)).clicked() {
-                        form.planner = form.planner.counting(counted);
-                    }
-                }
-            })
-            .response
-            .labelled_by(label.id)
-            .on_hover_text(
-                "Which voxels a view's gain counts: those that no look has seen yet, or all as in the paper",
-            );
-        ui.end_row();
-        let label = ui.label("candidates");
-        ui.add(egui::DragValue::new(&mut form.planner.candidates).range(0..=1000))
-            .labelled_by(label.id)
-            .on_hover_text("Push candidates drawn per decision, 0 to 1000; k = 80 in the paper");
-        ui.end_row();
-        let label = ui.label("drawn");
-        egui::ComboBox::from_id_salt("drawn")
-            .selected_text(drawn_at(form.planner.push_sampler))
-            .show_ui(ui, |ui| {
-                for sampler in PushSampler::ALL {
-                    ui.selectable_value(&mut form.planner.push_sampler, sampler, drawn_at(sampler));
-                }
-            })
-            .response
-            .labelled_by(label.id)
-            .on_hover_text(
-                "Where push candidates are drawn: at the frontier as in the paper, or before what no look has seen",
-            );
-        ui.end_row();
-        let label = ui.label("γ");
-        ui.add(egui::DragValue::new(&mut form.planner.gamma).range(0.0..=10.0).speed(0.01))
-            .labelled_by(label.id)
-            .on_hover_text("Weight of the disturbance term, 0 to 10: look if IGV > IGM + γ Reg");
-        ui.end_row();
+        views(ui, &mut form.views);
+        noise(ui, &mut form.noise);
+        settings(ui, &mut form.planner, Place::Form);
     });
-    ui.collapsing("Thresholds", |ui| thresholds(ui, &mut form.planner));
+    ui.collapsing("Thresholds", |ui| {
+        egui::Grid::new("thresholds").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
+            settings(ui, &mut form.planner, Place::Thresholds);
+            let hint = "Puts all of the planner's settings back to what goes with the belief";
+            if ui.small_button("Back to the defaults").on_hover_text(hint).clicked() {
+                form.planner = PlannerSettings::of_belief(&form.belief);
+            }
+            ui.end_row();
+        });
+    });
 }
 
-/// Which voxels count, in words.
-fn gain_of(counted: Counted) -> &'static str {
-    match counted {
-        Counted::All => "all voxels",
-        Counted::Unseen => "unseen voxels",
+/// The view array: one that comes with the program, or a file.
+fn views(ui: &mut egui::Ui, views: &mut String) {
+    let is_shipped = |name: &str| ViewArray::shipped().any(|shipped| shipped == name);
+    let label = ui.label("views");
+    egui::ComboBox::from_id_salt("views")
+        .selected_text(if is_shipped(views) { views.as_str() } else { "a file" })
+        .show_ui(ui, |ui| {
+            for name in ViewArray::shipped() {
+                ui.selectable_value(views, name.to_owned(), name);
+            }
+            if ui.selectable_label(!is_shipped(views), "a file").clicked() && is_shipped(views) {
+                *views = "views.toml".to_owned();
+            }
+        })
+        .response
+        .labelled_by(label.id)
+        .on_hover_text("The array of candidate camera poses");
+    ui.end_row();
+    if !is_shipped(views) {
+        let label = ui.label("array's file");
+        ui.add(egui::TextEdit::singleline(views).hint_text("views.toml").desired_width(120.0))
+            .labelled_by(label.id)
+            .on_hover_text("Path of a view array's file (.toml), made like assets/views/standard300.toml");
+        ui.end_row();
     }
 }
 
-/// Where push candidates are drawn, in words.
-fn drawn_at(sampler: PushSampler) -> &'static str {
-    match sampler {
-        PushSampler::Frontier => "at the frontier",
-        PushSampler::Hidden => "before the hidden",
+/// What the camera gets wrong.
+fn noise(ui: &mut egui::Ui, noise: &mut Option<NoiseModel>) {
+    let label = ui.label("noise");
+    egui::ComboBox::from_id_salt("noise")
+        .selected_text(NoiseModel::name_of(*noise))
+        .show_ui(ui, |ui| {
+            for (name, model) in NoiseModel::NAMED {
+                let model = Some(model).filter(|model| *model != NoiseModel::OFF);
+                ui.selectable_value(noise, model, name);
+            }
+        })
+        .response
+        .labelled_by(label.id)
+        .on_hover_text("What the camera gets wrong: nothing, or as much as a consumer depth camera on an arm");
+    ui.end_row();
+}
+
+/// The planner's settings of one place, a row each.
+fn settings(ui: &mut egui::Ui, planner: &mut PlannerSettings, place: Place) {
+    for setting in SETTINGS.iter().filter(|setting| setting.place == place) {
+        let label = ui.label(setting.label);
+        let hint = format!("{}; {}, default {}", setting.help, setting.limits(), setting.default_words());
+        setting_value(ui, planner, setting).labelled_by(label.id).on_hover_text(hint);
+        ui.end_row();
     }
 }
 
-/// A share between 0 and 1.
-fn share(value: &mut f32) -> egui::DragValue<'_> {
-    egui::DragValue::new(value).range(0.0..=1.0).speed(0.005).fixed_decimals(2)
-}
-
-/// The planner's thresholds.
-fn thresholds(ui: &mut egui::Ui, planner: &mut PlannerSettings) {
-    egui::Grid::new("thresholds").num_columns(2).spacing([10.0, 4.0]).show(ui, |ui| {
-        let label = ui.label("certain above");
-        ui.add(share(&mut planner.certain))
-            .labelled_by(label.id)
-            .on_hover_text("A floor cell is certain if max p is above this, 0 to 1; 0.85 in the paper");
-        ui.end_row();
-        let label = ui.label("complete at");
-        ui.add(share(&mut planner.complete))
-            .labelled_by(label.id)
-            .on_hover_text("Nothing is pushed once this share of the floor is certain, 0 to 1; 0.95 in the paper");
-        ui.end_row();
-        let label = ui.label("no push before");
-        ui.add(egui::DragValue::new(&mut planner.quiet_steps).range(0..=50).suffix(" looks"))
-            .labelled_by(label.id)
-            .on_hover_text("The first steps, in which nothing is pushed, 0 to 50; 3 in the paper");
-        ui.end_row();
-        let label = ui.label("looks after a push");
-        ui.add(egui::DragValue::new(&mut planner.closing_steps).range(1..=50))
-            .labelled_by(label.id)
-            .on_hover_text("So many looks follow a push before the next one, and at the end, 1 to 50; 1 in the paper");
-        ui.end_row();
-        let label = ui.label("patience");
-        ui.add(egui::DragValue::new(&mut planner.patience).range(0.1..=100.0).speed(0.1))
-            .labelled_by(label.id)
-            .on_hover_text("Look if patience IGV > IGM + γ Reg, 0.1 to 100; 1 in the paper");
-        ui.end_row();
-        let label = ui.label("a push promises");
-        ui.add(egui::DragValue::new(&mut planner.push_floor).range(0.0..=1e5).speed(10.0).prefix("≥ ").suffix(" nats"))
-            .labelled_by(label.id)
-            .on_hover_text("A push has to promise at least this, 0 to 100000 nats; 0 in the paper");
-        ui.end_row();
-        let label = ui.label("saturated below");
-        ui.add(share(&mut planner.saturation))
-            .labelled_by(label.id)
-            .on_hover_text("The policy saturation pushes if two best gains differ by less than this share; 0.02");
-        ui.end_row();
-        if ui.small_button("As in the paper").on_hover_text("Puts all numbers of the planner back").clicked() {
-            *planner = PlannerSettings::default();
+fn setting_value(ui: &mut egui::Ui, planner: &mut PlannerSettings, setting: &Setting) -> egui::Response {
+    let suffix = match setting.unit {
+        "" | "share" | "probability" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    match &setting.values {
+        Values::Whole { range: [low, high], of } => {
+            ui.add(egui::DragValue::new(of(planner)).range(*low..=*high).suffix(suffix))
         }
-        ui.end_row();
-    });
+        Values::Real { range: [low, high], step, of } => {
+            let value = egui::DragValue::new(of(planner)).range(*low..=*high).speed(f64::from(*step)).suffix(suffix);
+            ui.add(if *step < 0.01 { value.min_decimals(2) } else { value })
+        }
+        Values::Choice { choices, get, set } => {
+            let chosen = get(planner);
+            egui::ComboBox::from_id_salt(setting.name)
+                .selected_text(choices[chosen].label)
+                .show_ui(ui, |ui| {
+                    for (at, choice) in choices.iter().enumerate() {
+                        if ui.selectable_label(at == chosen, choice.label).clicked() {
+                            set(planner, at);
+                        }
+                    }
+                })
+                .response
+        }
+    }
 }
 
 fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
     ui.separator();
     ui.weak("Open episodes");
     for session in &model.sessions {
-        // From the right, so that a long title gives way to the button beside it.
-        let size = egui::vec2(ui.available_width(), ui.spacing().interact_size.y);
-        ui.allocate_ui_with_layout(size, egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            let is_shown = model.shown == Some(session.id);
-            if !is_shown {
-                let compare = ui.small_button("A|B");
+        let is_shown = model.shown == Some(session.id);
+        let busy = if session.activity == Activity::Idle { "" } else { " …" };
+        // In full: a branch is told from its origin by the end of its name.
+        let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
+        let row = ui.add(egui::Button::selectable(is_shown, title).wrap());
+        if row.on_hover_text(session.path.display().to_string()).clicked() {
+            ask.push(Command::Show(session.id));
+        }
+        if !is_shown {
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Min), |ui| {
+                let compare = ui.small_button("Compare");
                 compare.widget_info(|| {
                     let name = format!("Compare with {}", session.title());
                     egui::WidgetInfo::labeled(egui::WidgetType::Button, true, name)
@@ -314,15 +313,7 @@ fn others(ui: &mut egui::Ui, model: &Model, ask: &mut Vec<Command>) {
                 if compare.on_hover_text("Compare the shown episode with this one").clicked() {
                     ask.push(Command::CompareWith(Some(session.id)));
                 }
-            }
-            ui.with_layout(egui::Layout::left_to_right(egui::Align::Center), |ui| {
-                let busy = if session.activity == Activity::Idle { "" } else { " …" };
-                let title = format!("{} ({}/{}){busy}", session.title(), session.steps(), session.record.config.budget);
-                let row = ui.add(egui::Button::selectable(is_shown, title).truncate());
-                if row.on_hover_text(session.path.display().to_string()).clicked() {
-                    ask.push(Command::Show(session.id));
-                }
             });
-        });
+        }
     }
 }

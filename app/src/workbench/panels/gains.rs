@@ -9,7 +9,7 @@ use crate::workbench::model::{GainSource, Hovered, Model};
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::camera::{View, ViewArray, ViewId};
 use nudge_core::grid::Grid;
-use nudge_core::plan::{Counted, Decision};
+use nudge_core::plan::Decision;
 use re_viewer::external::egui::{
     self, Align2, Color32, Painter, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui, WidgetInfo, WidgetType,
     pos2, vec2,
@@ -66,10 +66,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
         heading(
             ui,
             format!("Gain of every view before step {step}"),
-            match session.record.config.planner.counted {
-                Counted::All => "IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), nats",
-                Counted::Unseen => "IG(v) = Σ unseen voxels H(p)·max over rays Π(1 − p before), nats",
-            },
+            weighed::view_gain(session.record.config.planner.counted),
         );
         map.show(ui, &mut touched);
         ui.add_space(6.0);
@@ -141,7 +138,7 @@ impl<'a> HeatMap<'a> {
             legend::bar(ui, &Bar { name: "gain", ends, unit: "nats", hint }, |t| Colormap::Cividis.rgb(t));
         });
         ui.label(
-            RichText::new("framed 1 and 2: best pair; hatched: used since the last push; from the front, left is left")
+            RichText::new("framed 1 and 2: best pair; hatched: used since the last push; as seen from the robot")
                 .small()
                 .weak(),
         );
@@ -236,7 +233,7 @@ impl<'a> HeatMap<'a> {
         let at = view.position();
         let used = if self.used.contains(&view.id) { "since the last push" } else { "not since the last push" };
         let facts = [
-            fact("gain", words::nats(gain), "Information gain of this view alone"),
+            fact("gain", words::nats(gain), "Gain of this view alone, under the belief before the step"),
             fact("of the best", words::percent(gain / best), "Share of the best view's gain"),
             fact("camera at", place([at.x, at.y, at.z]), "x to the right, y into the shelf, z up"),
             fact("looks at", place(view.target), "The look-at target"),
@@ -289,11 +286,7 @@ fn spread(state: &mut State, ui: &mut Ui, model: &Model, session: &Session, view
             });
         }
     });
-    ui.label(
-        RichText::new(format!("{} from all voxels, nats", words::significant(f64::from(spread.total), 3)))
-            .small()
-            .weak(),
-    );
+    ui.label(RichText::new(format!("{} from all voxels together", words::nats(spread.total))).small().weak());
 }
 
 impl Spread {

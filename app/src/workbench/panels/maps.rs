@@ -160,7 +160,7 @@ fn map(
     if let Some(cell) = drawn.chosen {
         ask.push(Command::Pick(Some(Picked::Cell(cell))));
     }
-    map_legend(ui, shown, &grid);
+    map_legend(ui, shown, &grid, session.record.config.planner.certain);
 }
 
 fn unknown(grid: &Grid) -> egui::ColorImage {
@@ -189,20 +189,22 @@ fn title(shown: Shown, grid: &Grid) -> (String, &'static str) {
     }
 }
 
-fn map_legend(ui: &mut Ui, shown: Shown, grid: &Grid) {
+/// `certain` is the probability above which a cell counts as known.
+fn map_legend(ui: &mut Ui, shown: Shown, grid: &Grid, certain: f32) {
     let bar = |ui: &mut Ui, map: Colormap, name: &str, high: String, unit: &str, hint: &str| {
         legend::bar(ui, &Bar { name, ends: ["0".to_owned(), high], unit, hint }, |t| map.rgb(t));
     };
     match shown {
         Shown::Slice(_) => {
-            bar(ui, Colormap::Viridis, "occupancy", "1".into(), "probability", "p from free to occupied")
+            bar(ui, Colormap::Viridis, "occupancy", "1".into(), "probability", "Probability that the voxel is occupied")
         }
         Shown::Map(MapKind::Certainty) => {
-            bar(ui, Colormap::Viridis, "certainty", "1".into(), "probability", "A cell above 0.85 counts as known");
+            let hint = format!("A cell above the threshold {certain} counts as certain");
+            bar(ui, Colormap::Viridis, "certainty", "1".into(), "probability", &hint);
         }
         Shown::Map(MapKind::Entropy) => {
             let high = picture::entropy_range(grid)[1];
-            let hint = "From nothing open to nothing known: ln 2 for every voxel below 0.27 m and ln 15 for the class";
+            let hint = "0 where everything is certain; the maximum, where nothing is known, is ln 2 for every voxel below 0.27 m and ln 15 for the class";
             bar(ui, Colormap::Magma, "entropy", words::significant(f64::from(high), 3), "nats", hint);
         }
         Shown::Map(MapKind::Error) => {

@@ -33,7 +33,7 @@ pub fn show(ui: &mut Ui, state: &mut State, id: SessionId, moment: &Moment) {
     heading(
         ui,
         format!("The arm in step {}", moment.step),
-        "How the arm moved: to the view, or in, along the push and back",
+        "How the arm moved: to the view, or to the start of the push, along it and back",
     );
     facts::show(ui, "arm motion", 2, &times(outcome, end));
     for mishap in mishaps(&outcome.record) {
@@ -50,7 +50,11 @@ pub fn show(ui: &mut Ui, state: &mut State, id: SessionId, moment: &Moment) {
             state.scrubbed = Some((step, at_s));
         }
         let scrubbed = state.at_s(step).is_some();
-        if ui.add_enabled(scrubbed, egui::Button::new("Let go")).on_hover_text("Hide the arm again").clicked() {
+        if ui
+            .add_enabled(scrubbed, egui::Button::new("Hide arm"))
+            .on_hover_text("Show the step without the arm again")
+            .clicked()
+        {
             state.scrubbed = None;
         }
     });
@@ -58,9 +62,9 @@ pub fn show(ui: &mut Ui, state: &mut State, id: SessionId, moment: &Moment) {
 
 fn times(outcome: &StepOutcome, end: f64) -> Vec<facts::Fact> {
     let seconds = |s: f64| format!("{} s", words::significant(s, 3));
-    let mut facts = vec![fact("moves", seconds(end), "The whole motion of the arm, its own time")];
+    let mut facts = vec![fact("whole motion", seconds(end), "How long the arm moves, in its own time")];
     if let (Some(push), true) = (&outcome.record.decision.motion, outcome.push_outcome.is_some()) {
-        facts.push(fact("way in", seconds(push.way_in.duration_s()), "From where the arm waits to the push's start"));
+        facts.push(fact("approach", seconds(push.way_in.duration_s()), "From where the arm waits to the push's start"));
         facts.push(fact("push", seconds(push.push.duration_s()), "Along the push"));
     }
     facts

@@ -104,9 +104,10 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
                 match decision {
                     None => decision::nothing(ui, session, "what pushes would do", ask),
                     Some(_) => {
-                        ui.weak("No push was considered before this step");
+                        ui.weak(format!("No push was weighed before step {}", step + 1));
                     }
                 }
+                here.way_to_push(ui, ask);
             }
         }
         here.review(state, ui);
@@ -132,7 +133,7 @@ impl Here<'_> {
         ask: &mut Vec<Command>,
     ) {
         let title = format!("Push candidates before step {}", self.step + 1);
-        heading(ui, title, "Every arrow is the way of the tool's tip; the colour is its value, gain + γ·Reg");
+        heading(ui, title, "Every arrow is the path of the tool's tip; the colour is its value, gain + γ·Reg in nats");
         self.floor(state, ui, decision, touched, ask);
         let State { sort, rejected, .. } = state;
         let table = decision::push_table(ui, sort, rejected, self.model, self.session, decision, 190.0);
@@ -218,12 +219,16 @@ impl Here<'_> {
                 ask.push(Command::Preview(candidate.push));
             }
         }
-        ui.scope(|ui| {
-            ui.set_max_width(width.min(420.0));
-            let ends = range.map(|nats| words::significant(f64::from(nats), 3));
-            let hint = "Gain + γ·Reg, nats: what looking has to beat";
-            legend::bar(ui, &Bar { name: "value", ends, unit: "value, nats", hint }, |t| Colormap::Cividis.rgb(t));
-        });
+        if decision.candidates.iter().all(|candidate| weighed::value(candidate, gamma).is_none()) {
+            ui.label(RichText::new("white: not weighed, this policy pushes at random").small().weak());
+        } else {
+            ui.scope(|ui| {
+                ui.set_max_width(width.min(420.0));
+                let ends = range.map(|nats| words::significant(f64::from(nats), 3));
+                let hint = "Gain + γ·Reg, nats: what is compared with looking";
+                legend::bar(ui, &Bar { name: "value", ends, unit: "value, nats", hint }, |t| Colormap::Cividis.rgb(t));
+            });
+        }
         let note = if state.rejected { "grey, dashed: rejected" } else { "rejected pushes are hidden" };
         ui.label(RichText::new(format!("front edge at the bottom; {note}")).small().weak());
     }
@@ -231,7 +236,7 @@ impl Here<'_> {
     /// What a push would do: now, predicted, the change, and what happened if it was done.
     fn chosen(&self, state: &mut State, ui: &mut Ui, at: usize, candidate: &CandidateRecord, ask: &mut Vec<Command>) {
         let gamma = self.session.record.config.planner.gamma;
-        heading(ui, format!("Push {at}"), "The push that was clicked");
+        heading(ui, format!("Push {at}"), "The push that is looked at; click another one in the table or on the map");
         let nats = |value: Option<f32>| value.map_or("not weighed".to_owned(), words::nats);
         let [x, y, _] = candidate.push.start;
         let way = format!("{:.0} mm to {:.0}°", candidate.push.length_m * 1e3, candidate.push.direction_deg);
@@ -239,11 +244,11 @@ impl Here<'_> {
         let place = format!("x {}, y {} m", words::metres(x), words::metres(y));
         let facts = [
             fact("value", nats(weighed::value(candidate, gamma)), "Gain + γ·Reg"),
-            fact("gain", nats(candidate.gain), "What it is worth under the predicted belief: IGM, were it the best"),
-            fact("Reg", nats(candidate.reg), "min(0, H(labels) − H(labels, predicted)): what it would blur"),
-            fact("best view", view, "The view that tells most under the predicted belief"),
+            fact("gain", nats(candidate.gain), weighed::push_gain(self.session.record.config.planner.counted)),
+            fact("γ·Reg", nats(candidate.reg.map(|reg| gamma * reg)), weighed::DISTURBANCE),
+            fact("best view", view, "The view with the largest gain under the predicted belief"),
             fact("from", place, "Where the tip starts"),
-            fact("way", way.replace('-', "−"), "Length and direction; 90° is into the shelf"),
+            fact("length", way.replace('-', "−"), "Planned length and direction; 90° is into the shelf"),
         ];
         facts::show(ui, "push numbers", 2, &facts);
         if let Some(rejection) = &candidate.rejection {
@@ -253,7 +258,7 @@ impl Here<'_> {
         match self.model.preview.as_ref().filter(asked) {
             Some(preview) => self.prediction(state, ui, preview, ask),
             None if self.session.setup.update.is_none() => {
-                ui.weak("What it would do cannot be predicted: the networks are not here");
+                ui.weak("What it would do cannot be predicted: this program lacks the networks of the episode");
             }
             None => {
                 ui.weak("Click the push to predict what it would do");
@@ -347,6 +352,24 @@ impl Here<'_> {
             words::significant(f64::from(expected * cell_cm2), 2)
         );
         ui.label(RichText::new(text).small());
+    }
+
+    /// Offers the way to the state before the nearest push.
+    fn way_to_push(&self, ui: &mut Ui, ask: &mut Vec<Command>) {
+        let steps = self.session.record.steps.iter();
+        let mut pushes = steps.filter(|step| matches!(step.action, Action::Push(_))).map(|step| step.index).peekable();
+        if pushes.peek().is_none() {
+            ui.weak("No push was done in this episode");
+        }
+        let elsewhere = pushes.filter(|step| step - 1 != self.step);
+        let Some(nearest) = elsewhere.min_by_key(|step| (step - 1).abs_diff(self.step)) else { return };
+        let hint = "Shows the pushes that were weighed before that step, and what became of the one that was done";
+        ui.scope(|ui| {
+            super::framed(ui);
+            if ui.button(format!("Go to the push of step {nearest}")).on_hover_text(hint).clicked() {
+                ask.push(Command::GoTo(nearest - 1));
+            }
+        });
     }
 
     /// What the push that led to the state at the cursor did.

@@ -2,6 +2,7 @@
 
 use super::facts::{self, fact};
 use super::{heading, words};
+use crate::record::decision::length;
 use crate::workbench::session::{Moment, SessionId};
 use nudge_core::belief::PushPrediction;
 use nudge_core::episode::EpisodeRecord;
@@ -69,7 +70,6 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
     heading(ui, title, "The prediction beside what really happened in the simulated shelf");
     let moved = pushed.displacement_m.iter().filter(|m| **m > 0.002).count();
     let total: f32 = pushed.displacement_m.iter().filter(|m| m.is_finite()).sum();
-    let asked = outcome.swept.as_ref().map_or(f32::NAN, |swept| swept.push.length_m);
     let share = |share: Option<f32>| share.map_or("n/a".to_owned(), words::percent);
     let dropped = if outcome.record.dropped.is_empty() {
         "nothing".to_owned()
@@ -86,14 +86,14 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
         fact("displacement", format!("{:.0} mm", total * 1e3), "Of all objects together"),
         fact(
             "tool went",
-            format!("{:.0} of {:.0} mm", pushed.pushed_m * 1e3, asked * 1e3),
-            "How far the tip moved along the push",
+            length(&outcome.record).unwrap_or_default(),
+            "How far the tip moved along the push, of the length that was planned",
         ),
-        fact("blocked", if pushed.stalled { "yes" } else { "no" }, "Whether the tool jammed and gave up"),
+        fact("blocked", if pushed.stalled { "yes" } else { "no" }, "Whether the arm met too much force and stopped"),
         fact("dropped", dropped, "Objects that left the board"),
         fact("cells changed", review.changed.to_string(), "Floor cells in whose column something really changed"),
-        fact("predicted", predicted, "Floor cells with a predicted probability of change above 0.5"),
-        fact("both", review.both.to_string(), "Cells that were predicted to change and did"),
+        fact("predicted to change", predicted, "Floor cells with a predicted probability of change above 0.5"),
+        fact("of these, changed", review.both.to_string(), "Cells that were predicted to change and did"),
         fact("precision", share(review.precision()), "Share of the cells predicted to change that did"),
         fact("recall", share(review.recall()), "Share of the cells that changed which were predicted to"),
         fact(

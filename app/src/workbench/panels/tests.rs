@@ -4,12 +4,13 @@ use super::*;
 use crate::workbench::command::Command;
 use crate::workbench::fixture;
 use crate::workbench::model::{LayoutKind, Picked};
-use crate::workbench::session::Activity;
+use crate::workbench::session::{Activity, Moment};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use nudge_core::plan::Action;
 use std::sync::Arc;
 
+mod form;
 mod look;
 
 type Show = fn(&mut egui::Ui, &mut Model, &mut Vec<Command>);
@@ -251,8 +252,8 @@ fn why_tells_the_causes_of_a_swept_voxel() {
     let voxel = swept.iter().nth(swept.len() / 2).expect("sweeps something");
     model.picked = Some(Picked::Voxel(voxel));
     let mut harness = harness(why::show, model);
-    assert!(has(&harness, "Voxel at") && has(&harness, "step 4: push swept it"));
-    harness.query_all_by_label_contains("step 4: push swept it").next().expect("cause").click();
+    assert!(has(&harness, "Voxel at") && has(&harness, "step 4, push: swept"));
+    harness.query_all_by_label_contains("step 4, push: swept").next().expect("cause").click();
     harness.run_steps(2);
     assert!(asked(&harness, |command| matches!(command, Command::GoTo(4)).then_some(())).is_some());
     harness.get_by_label("Its floor cell").click();
@@ -263,6 +264,27 @@ fn why_tells_the_causes_of_a_swept_voxel() {
     });
     let height = harness.state().model.sessions[0].moments[0].belief.grid().dims[2];
     assert_eq!(cell, Some(voxel / height));
+}
+
+#[test]
+fn why_tells_of_a_change_that_a_network_made_without_seeing() {
+    let mut model = fixture::model();
+    model.sessions[0].record.config.belief = nudge_core::belief::CNABU.to_owned();
+    let moment = model.sessions[0].moments[2].clone();
+    let outcome = moment.outcome.as_ref().expect("step 2");
+    let Action::Look { view } = outcome.record.action else { panic!("step 2 is a look") };
+    let observation = outcome.observation.as_ref().expect("a look");
+    let mut belief = moment.belief.belief();
+    let unseen = |voxel: &usize| !observation.free.contains(*voxel) && !observation.occupied.contains(*voxel);
+    let before = model.sessions[0].moments[1].belief.belief();
+    let voxel = (0..belief.occupancy.len()).filter(unseen).find(|voxel| before.probability(*voxel) < 0.7).expect("one");
+    belief.occupancy[voxel] = [8.0, 2.0];
+    let belief = crate::workbench::half_belief::HalfBelief::of(&belief);
+    model.sessions[0].moments[2] = Arc::new(Moment { belief, ..(*moment).clone() });
+    model.picked = Some(Picked::Voxel(voxel));
+    let harness = harness(why::show, model);
+    assert!(has(&harness, &format!("step 2, look from view {}: network, not seen", view.0)));
+    assert!(has(&harness, "→ 0.80"));
 }
 
 #[test]
@@ -291,7 +313,7 @@ fn a_click_on_a_heat_map_explains_a_view() {
     assert!(asked(&harness, |command| matches!(command, Command::GainOf(ViewId(1))).then_some(())).is_some());
     fixture::answer(&mut harness.state_mut().model);
     harness.run_steps(2);
-    assert!(has(&harness, "By height") && has(&harness, "from all voxels"));
+    assert!(has(&harness, "By height") && has(&harness, "nats from all voxels together"));
 }
 
 #[test]
@@ -324,7 +346,7 @@ fn a_comparison_tells_where_two_episodes_part() {
     assert!(has(&harness, "Choose a second episode"));
     harness.state_mut().model.other = Some(crate::workbench::session::SessionId(2));
     harness.run_steps(2);
-    assert!(has(&harness, "They part at step 2: A looks from view"));
+    assert!(has(&harness, "First difference at step 2: A looks from view"));
     assert!(has(&harness, "B ends after step 3"));
     harness.get_by_label("Go to step 1").click();
     harness.run_steps(2);
@@ -332,4 +354,48 @@ fn a_comparison_tells_where_two_episodes_part() {
     for map in ["Floor map of A", "Floor map of B", "Floor map of A − B"] {
         assert!(harness.query_by_label(map).is_some(), "{map}");
     }
+}
+
+#[test]
+fn steps_without_a_push_offer_the_way_to_the_nearest() {
+    let mut model = fixture::model();
+    model.cursor = 0;
+    let mut harness = harness(push::show, model);
+    assert!(has(&harness, "No push was weighed before step 1"));
+    harness.get_by_label("Go to the push of step 4").click();
+    harness.run_steps(2);
+    assert!(asked(&harness, |command| matches!(command, Command::GoTo(3)).then_some(())).is_some());
+    harness.state_mut().model = fixture::model_of(vec![fixture::stray_session(2)]);
+    harness.state_mut().model.cursor = 0;
+    harness.run_steps(2);
+    assert!(has(&harness, "No push was done in this episode"));
+}
+
+#[test]
+fn a_push_that_was_blocked_early_tells_the_length_that_was_planned() {
+    let mut model = fixture::model();
+    let moment = model.sessions[0].moments[4].clone();
+    let mut outcome = (**moment.outcome.as_ref().expect("step 4")).clone();
+    let Action::Push(mut push) = outcome.record.action else { panic!("step 4 is a push") };
+    push.length_m = 0.14;
+    outcome.record.action = Action::Push(push);
+    // What it swept ends where the arm was blocked.
+    outcome.swept.as_mut().expect("swept").push.length_m = 0.05;
+    let report = outcome.record.push.as_mut().expect("a report");
+    (report.pushed_m, report.stalled) = (0.05, true);
+    let pushed = outcome.push_outcome.as_mut().expect("an outcome");
+    (pushed.pushed_m, pushed.stalled) = (0.05, true);
+    model.sessions[0].moments[4] = Arc::new(Moment { outcome: Some(Arc::new(outcome)), ..(*moment).clone() });
+    model.cursor = 4;
+    let harness = harness(push::show, model);
+    assert!(has(&harness, "What the push of step 4 did") && harness.query_by_label("50 of 140 mm").is_some());
+    assert!(has(&harness, "the arm was blocked after 50 of 140 mm of its push") && !has(&harness, "50 of 50"));
+}
+
+#[test]
+fn the_networks_belief_is_named_in_words() {
+    let mut model = fixture::model();
+    model.sessions[0].record.config.belief = nudge_core::belief::CNABU.to_owned();
+    let harness = harness(episode::show, model);
+    assert!(has(&harness, "networks (cnabu)"));
 }

@@ -4,7 +4,7 @@ use super::table::{Cell, Column, Row};
 use super::words;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::EpisodeRecord;
-use nudge_core::plan::{Action, CandidateRecord, Decision};
+use nudge_core::plan::{Action, CandidateRecord, Counted, Decision};
 use std::collections::BTreeSet;
 
 /// How many views and pushes the tables list.
@@ -59,18 +59,49 @@ pub fn pushed(decision: &Decision) -> Option<usize> {
     }
 }
 
+/// The candidate that is looked at unless another one is chosen: the one that is pushed, else the best one.
+pub fn looked_at_first(decision: &Decision) -> Option<usize> {
+    pushed(decision).or(decision.best_push).filter(|at| *at < decision.candidates.len())
+}
+
+/// What a view's gain is, with the formula that applies.
+pub fn view_gain(counted: Counted) -> &'static str {
+    match counted {
+        Counted::All => {
+            "Information gain of the view, nats: IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), summed over rays"
+        }
+        Counted::Unseen => {
+            "Coverage of the view, nats: IG(v) = Σ voxels H(p)·max over rays Π(1 − p before); every voxel that no look has \
+             seen counts once, however many rays meet it"
+        }
+    }
+}
+
+/// What a push's gain is, with the formula that applies.
+pub fn push_gain(counted: Counted) -> &'static str {
+    match counted {
+        Counted::All => "Gain of the best single view under the predicted belief, nats: max over views of IG(v)",
+        Counted::Unseen => {
+            "What the push opens, nats: Σ voxels H(p predicted) that a ray of some view reaches after it and none before, of \
+             those that no look has seen"
+        }
+    }
+}
+
 /// Columns of [`view_rows`].
-pub const VIEW_COLUMNS: [Column; 5] = [
-    Column { title: "View", hint: "Number of the view in its array", width: 34.0 },
-    Column {
-        title: "Gain",
-        hint: "Information gain of the view alone, nats: IG(v) = Σ rays Σ voxels H(p)·Π(1 − p)",
-        width: 52.0,
-    },
-    Column { title: "Of best", hint: "Share of the best view's gain", width: 46.0 },
-    Column { title: "Camera at", hint: "Column, row and look-at target in the array, counted from 1", width: 62.0 },
-    Column { title: "Note", hint: "Whether it is chosen, in the best pair, or used since the last push", width: 60.0 },
-];
+pub fn view_columns(counted: Counted) -> [Column; 5] {
+    [
+        Column { title: "View", hint: "Number of the view in its array", width: 34.0 },
+        Column { title: "Gain", hint: view_gain(counted), width: 52.0 },
+        Column { title: "Of best", hint: "Share of the best view's gain", width: 46.0 },
+        Column { title: "Camera at", hint: "Column, row and look-at target in the array, counted from 1", width: 62.0 },
+        Column {
+            title: "Note",
+            hint: "Whether it is chosen, in the best pair, or used since the last push",
+            width: 60.0,
+        },
+    ]
+}
 
 /// The best views of a decision.
 pub fn view_rows(
@@ -115,23 +146,21 @@ pub fn view_rows(
 }
 
 /// Columns of [`push_rows`].
-pub const PUSH_COLUMNS: [Column; 7] = [
-    Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
-    Column { title: "Value", hint: "Gain + γ·Reg, nats: what looking has to beat", width: 50.0 },
-    Column {
-        title: "Gain",
-        hint: "What the push is worth under the predicted belief: IGM, were it the best, nats",
-        width: 50.0,
-    },
-    Column {
-        title: "γ·Reg",
-        hint: "What the push would blur, nats, at most 0: Reg = min(0, H(labels) − H(labels, predicted))",
-        width: 42.0,
-    },
-    Column { title: "To", hint: "Direction in degrees; 90 is into the shelf, 0 to the right", width: 34.0 },
-    Column { title: "mm", hint: "How far the tool pushes, millimetres", width: 30.0 },
-    Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 },
-];
+pub fn push_columns(counted: Counted) -> [Column; 7] {
+    [
+        Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
+        Column { title: "Value", hint: "Gain + γ·Reg, nats: what is compared with looking", width: 50.0 },
+        Column { title: "Gain", hint: push_gain(counted), width: 50.0 },
+        Column { title: "γ·Reg", hint: DISTURBANCE, width: 42.0 },
+        Column { title: "To", hint: "Direction, degrees; 90 is into the shelf, 0 to the right", width: 34.0 },
+        Column { title: "mm", hint: "Planned length of the push, millimetres", width: 30.0 },
+        Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 },
+    ]
+}
+
+/// What `γ·Reg` is.
+pub const DISTURBANCE: &str = "What the push makes uncertain of the classes, nats, at most 0: γ times Reg = min(0, H(classes now) − H(classes \
+     predicted)), H the entropy of the semantic map";
 
 /// Which candidates a table lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,4 +216,20 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
         }
     };
     order.into_iter().map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gain_by_coverage_is_not_explained_as_a_sum_over_rays() {
+        let gain = |counted| view_columns(counted)[1].hint;
+        assert!(gain(Counted::All).contains("Σ rays Σ voxels"), "{}", gain(Counted::All));
+        let coverage = gain(Counted::Unseen);
+        assert!(coverage.contains("max over rays") && !coverage.contains("Σ rays"), "{coverage}");
+        let push = |counted| push_columns(counted)[2].hint;
+        assert!(push(Counted::All).contains("best single view"), "{}", push(Counted::All));
+        assert!(push(Counted::Unseen).contains("opens") && !push(Counted::Unseen).contains("best single view"));
+    }
 }

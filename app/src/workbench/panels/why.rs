@@ -19,6 +19,10 @@ use re_viewer::external::egui::{
     WidgetInfo, WidgetType, pos2, vec2,
 };
 
+/// What the vacuity of a Dirichlet is.
+const UNKNOWN_SHARE: &str =
+    "Vacuity of the Dirichlet, 15 / Σ a for its 15 classes: 1 without evidence, towards 0 with more of it";
+
 /// Draws the numbers, the history and the causes of what was picked.
 pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     let Some(session) = model.session() else { return empty(ui, NO_EPISODE) };
@@ -68,7 +72,7 @@ impl About<'_> {
             Picked::Voxel(voxel) => {
                 let place = words::voxel_place(&self.grid, self.grid.voxel(voxel));
                 heading(ui, format!("Voxel at {place}"), "Centre of the voxel; z is the height above the board");
-                if ui.small_button("Its floor cell").on_hover_text("Asks about the whole column").clicked() {
+                if ui.small_button("Its floor cell").on_hover_text("Shows the whole column above the floor").clicked() {
                     ask.push(Command::Pick(Some(Picked::Cell(self.cell))));
                 }
             }
@@ -112,7 +116,7 @@ impl About<'_> {
             vec![
                 fact("entropy", words::nats(all), "Of the column's voxels below 0.27 m and the class together, nats"),
                 fact("of the class", words::nats(class), "H of the class probabilities, 0 to ln 15 = 2.71 nats"),
-                fact("vacuity", number(dirichlet_vacuity(&a)), "K / Σ a: 1 without evidence, towards 0 with much"),
+                fact("unknown share", number(dirichlet_vacuity(&a)), UNKNOWN_SHARE),
                 fact("evidence", evidence, "Σ a, the sum of the Dirichlet's parameters, 15 at the start"),
                 fact("truth", self.true_class(), "The class of the tallest object above the cell"),
             ]
@@ -169,17 +173,21 @@ impl About<'_> {
     }
 
     fn causes(&self, ui: &mut Ui, ask: &mut Vec<Command>) {
-        heading(ui, "What changed it", "Observations and pushes that touched it; click one to go to its step");
+        heading(
+            ui,
+            "What changed it",
+            "Looks and pushes that saw it, swept it or changed it by more than 0.02; click one to go to its step",
+        );
         let changes = causes::of(self.session, self.picked);
         if changes.is_empty() {
             ui.weak(if self.session.steps() == 0 {
                 "Nothing yet: no action was taken"
             } else {
-                "No look or push has touched it"
+                "No look or push has changed it"
             });
         }
         for change in changes {
-            let text = format!("step {}: {}", change.step, change.causes.join(", "));
+            let text = format!("step {}, {}: {}", change.step, change.action, change.causes.join(", "));
             ui.horizontal(|ui| {
                 let [from, to] = change.from_to.map(words::probability);
                 let numbers = format!("{from} → {to}");
@@ -284,8 +292,8 @@ impl About<'_> {
             spark::bar(ui, &bar, 112.0, 30.0)
                 .on_hover_text(format!("Dirichlet parameter {}", words::significant(f64::from(*a), 3)));
         }
-        let vacuity = words::probability(dirichlet_vacuity(&self.moment.belief.cell(self.cell)));
-        ui.label(RichText::new(format!("vacuity {vacuity}, truth: {}", self.true_class())).small())
-            .on_hover_text("Vacuity K / Σ a: 1 without evidence, towards 0 with much");
+        let unknown = words::probability(dirichlet_vacuity(&self.moment.belief.cell(self.cell)));
+        ui.label(RichText::new(format!("unknown share {unknown}; truth: {}", self.true_class())).small())
+            .on_hover_text(UNKNOWN_SHARE);
     }
 }

@@ -78,7 +78,7 @@ fn write_to(ui: &mut egui::Ui, what: MenuCommand, path: &mut String, part: &mut 
 fn broke(ui: &mut egui::Ui, id: SessionId, words: &str, path: &Path, steps: usize) -> Option<Reply> {
     ui.set_width(460.0);
     ui.heading("The episode stopped");
-    ui.label(format!("Its worker broke down: {words}"));
+    ui.label(format!("The program met a fault in it: {words}"));
     let actions = if steps == 1 { "1 action is".to_owned() } else { format!("All {steps} actions are") };
     ui.label(format!("{actions} saved in {}. The window and other episodes are as they were.", path.display()));
     ui.add_space(6.0);
@@ -88,7 +88,7 @@ fn broke(ui: &mut egui::Ui, id: SessionId, words: &str, path: &Path, steps: usiz
         if export.clicked() {
             reply = Some(Reply::Export(id));
         }
-        let reopen = ui.button("Open it again").on_hover_text("Close it, and go on from what is saved");
+        let reopen = ui.button("Open it again").on_hover_text("Close it, and resume from what is saved");
         if reopen.clicked() {
             reply = Some(Reply::Reopen(id));
         }
@@ -139,7 +139,7 @@ fn shortcuts(ui: &mut egui::Ui) {
             ui.add_space(20.0);
         }
     });
-    ui.weak("In the editor: arrows move, R turns. Esc closes this.");
+    ui.weak("← and → step through the episode; in the editor, arrows move and R turns objects. Esc closes this.");
 }
 
 fn about(ui: &mut egui::Ui) {

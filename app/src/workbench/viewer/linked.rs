@@ -6,13 +6,13 @@
 use re_sdk_types::ViewClassIdentifier;
 use re_sdk_types::blueprint::archetypes::EyeControls3D;
 use re_view_spatial::SpatialView3D;
+use re_viewer::external::{re_sdk_types, re_view_spatial, re_viewer_context, re_viewport_blueprint};
 use re_viewer_context::{
     IdentifiedViewSystem, MissingChunkReporter, ViewClass as _, ViewContext, ViewContextSystem,
     ViewContextSystemOncePerFrameResult, ViewId, ViewQuery, ViewSystemIdentifier, ViewerContext,
 };
 use re_viewport_blueprint::ViewProperty;
 use rerun::components::{Position3D, Vector3D};
-use re_viewer::external::{re_sdk_types, re_view_spatial, re_viewer_context, re_viewport_blueprint};
 use std::sync::{Mutex, PoisonError};
 
 /// The kind of view that is linked.

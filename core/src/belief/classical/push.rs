@@ -1,25 +1,25 @@
 //! A classical prediction of what a push leaves behind.
 //!
-//! Nothing is simulated. Four things are said, all of them inside a window around the swept volume:
+//! Nothing is simulated. The prediction makes four assumptions, all inside a window around the swept volume:
 //!
-//! * **Swept columns are free.** Where arm and tool have been nothing stands any more, and since objects stand on the
-//!   board and do not overhang nothing is above either, as surely as the log-odds limit allows. Below, the column is free
-//!   too where the tool passed lower than any object is high ([`SHORTEST_M`]), or where it met something, which then has
-//!   left; what is lower than a link that passed above it stays. The reported change of a swept cell is the largest
-//!   occupancy probability that was met in it.
-//! * **What the tool meets first moves with it.** The object's patch of the floor plan ([`FloorPlan::patch`]) is shifted
-//!   along the push by what is left of it after the contact, up to the walls. Where it stood is free, where it goes its
-//!   evidence goes with it, halved in log-odds (it may turn or slip off), and so do its labels.
-//! * **Evidence of things near the push decays to the prior**, because what moves runs into other things. The chance
-//!   that a cell changes is one within [`NEAR_M`] of the tip's track, which is drawn out by [`AHEAD_M`] beyond its end
-//!   because that is where things go, falls linearly to zero at [`FAR_M`], and is scaled by the probability that the
-//!   tool meets anything. Cells behind the start keep their evidence: nothing moves against a push.
-//! * **Known free space stays free** unless the moved object comes to stand there. If it decayed like the rest, every
-//!   push would promise a large gain for looking again at what was only forgotten: a ray through many voxels of small
-//!   `p` gains up to `H(p) / p` nats, 4 at `p = 0.05` but 1.4 in truly unknown space.
+//! * **Swept columns are free.** Where arm and tool have passed, nothing stands any more. Objects stand on the board
+//!   and do not overhang, so nothing is above either, as surely as the log-odds limit allows. Below, the column is free
+//!   too where the tool passed lower than any object is high ([`SHORTEST_M`]), or where it touched something, which has
+//!   then left. What is lower than a link that passed above it stays. The reported change of a swept cell is the
+//!   largest occupancy probability in the swept part of its column.
+//! * **The first object that the tool touches moves with it.** Its patch of the floor plan ([`FloorPlan::patch`]) is
+//!   shifted along the push for the rest of the push after the contact, at most up to the walls. Where it stood is
+//!   free. Its evidence moves along, halved in log-odds (it may turn or slip off), and so do its labels.
+//! * **Evidence of objects near the push decays to the prior**, because a moving object pushes others. The probability
+//!   of change is 1 within [`NEAR_M`] of the tip's track, falls linearly to 0 at [`FAR_M`], and is scaled by the
+//!   probability that the tool touches anything. The track is extended by [`AHEAD_M`] beyond its end, because that is
+//!   where objects go. Cells behind the start keep their evidence: nothing moves against a push.
+//! * **Known free space stays free** unless the moved object comes to stand there. If it decayed as well, every push
+//!   would promise a large gain for looking again at what was only forgotten: a ray through many voxels of small `p`
+//!   gains up to `H(p) / p` nats, 4 at `p = 0.05` but 1.4 in truly unknown space.
 //!
-//! The posterior is gated with the chance of change: `lambda' = (1 - p) lambda + p lambda_predicted`; swept columns are
-//! free for certain.
+//! The posterior is gated with the probability of change: `lambda' = (1 - p) lambda + p lambda_predicted`; swept
+//! columns are free for certain.
 
 use super::{LOG_ODDS_LIMIT, evidence, log_odds};
 use crate::Point;
@@ -28,18 +28,19 @@ use crate::belief::{Belief, FloorPlan, PushPrediction, SweptPush, beta_mean};
 use crate::grid::Window;
 use crate::scene::{BACKGROUND, CLASS_COUNT};
 
-/// Distance from the tip's track within which a thing surely changes, if the tool meets anything, metres.
+/// Distance from the tip's track within which an object surely moves, if the tool touches anything, metres.
 pub const NEAR_M: f32 = 0.03;
 /// Distance from the tip's track from which nothing changes, metres.
 pub const FAR_M: f32 = 0.09;
-/// How far the track is drawn out beyond the end of the push, metres: about the depth of what is pushed.
+/// How far the track is extended beyond the end of the push, metres: about the depth of what is pushed.
 pub const AHEAD_M: f32 = 0.06;
 /// Lower than any object is high, metres: what passes here passes through the whole column.
 pub const SHORTEST_M: f32 = 0.06;
-/// Evidence for free space where an object has left, strong enough to outweigh in the gate what was known of it.
+/// Evidence for free space where an object has left, strong enough to outweigh the old evidence in the gate.
 const GONE: f32 = 100.0;
 
-/// The belief that a push is predicted to leave. `plan` holds the belief's things ([`SOLID`](crate::belief::SOLID)).
+/// The belief that a push is predicted to leave. `plan` holds the occupied floor cells
+/// ([`SOLID`](crate::belief::SOLID)).
 pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> PushPrediction {
     let grid = &belief.grid;
     let height = grid.dims[2];
@@ -115,7 +116,8 @@ fn gated(before: [f32; 2], predicted: [f32; 2], p: f32) -> [f32; 2] {
     std::array::from_fn(|k| (1.0 - p) * before[k] + p * predicted[k])
 }
 
-/// The columns that the prediction may touch: swept cells, everything within reach of the track, and what moves.
+/// The columns that the prediction may change: swept cells, cells within [`FAR_M`] of the track, and cells that the
+/// moved object leaves or comes to.
 fn window(belief: &Belief, met: &Met, track: &Track, carried: Option<&Carried>) -> Window {
     let grid = &belief.grid;
     let (mut low, mut high) = ([usize::MAX; 2], [0_usize; 2]);
@@ -143,7 +145,7 @@ fn window(belief: &Belief, met: &Met, track: &Track, carried: Option<&Carried>) 
     Window { x: [low[0], high[0]], y: [low[1], high[1]] }
 }
 
-/// 1 near the tip's track, drawn out ahead; 0 far from it or behind its start.
+/// 1 near the extended track of the tip, 0 far from it or behind its start.
 fn nearness(track: &Track, on_board: Point) -> f32 {
     let along = track.along(on_board);
     if along < 0.0 {

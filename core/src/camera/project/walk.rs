@@ -1,10 +1,10 @@
 //! Marking what rays see through: the voxels of `Grid::traverse`, several neighbouring rays in step.
 //!
 //! An image asks for ten to thirty million voxel visits, and most of them mark what a neighbour has marked already. So
-//! marks are bytes that are only ever set, which needs no look at what is there; rays run side by side without
-//! branches, which lets the compiler use vector instructions; and a ray that is done simply marks its last voxel again.
-//! Numbers are single here; against the grid's own traversal a ray may miss or add voxels that it crosses for less than
-//! a few hundredths of a millimetre.
+//! marks are bytes that are only ever set, never read on the way; rays run side by side without branches, which lets
+//! the compiler use vector instructions; and a ray that is done simply marks its last voxel again. Numbers are single
+//! here; against the grid's own traversal a ray may miss or add voxels that it crosses for less than a few hundredths
+//! of a millimetre.
 
 use crate::grid::Grid;
 use crate::{Point, Vector};

@@ -1,7 +1,8 @@
-//! Where a sequence of sigma_o may begin, beside the uniform belief: with what sigma_m leaves after a push.
+//! Training sequences of sigma_o that begin with the belief that sigma_m predicts after a push, and not with the
+//! uniform belief.
 //!
-//! In an episode sigma_o looks again at what was pushed, and its prior is then a prediction that may be wrong. Trained on
-//! beliefs of its own alone it would never learn how far to trust that.
+//! In an episode, sigma_o is applied to looks at what was pushed, and its prior is then a prediction that may be wrong.
+//! Trained on its own beliefs alone, it would never learn how far to trust a prediction.
 
 use super::batch::Batch;
 use super::kept::Kept;

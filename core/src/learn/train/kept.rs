@@ -1,8 +1,8 @@
-//! What is made of samples once and kept as far as there is room.
+//! A cache of what is computed from samples, limited by memory.
 
 use std::collections::HashMap;
 
-/// Room for what is kept of one kind, bytes.
+/// Memory for what is kept of one kind, bytes.
 const ROOM: usize = 6 << 30;
 
 /// What was made of samples, by sample number.

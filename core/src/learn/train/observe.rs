@@ -103,8 +103,8 @@ impl ObserveTrainer {
     }
 }
 
-/// One to `longest` views of a sample that has `count`: all of them in a random order, and then some again, as an episode
-/// goes on looking when it has seen what there is to see.
+/// One to `longest` views of a sample that has `count`: all of them in a random order, and then some again, as an
+/// episode looks on when it has seen everything.
 fn sequence(count: usize, longest: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let length = rng.random_range(1..=longest);
     let mut views: Vec<usize> = (0..count).collect();

@@ -130,7 +130,8 @@ impl PushTrainer {
     }
 }
 
-/// What the frozen sigma_o makes of a sample, and what its pushes carry along according to that.
+/// The belief of the frozen sigma_o after the views of a sample, and the objects that its pushes move according to that
+/// belief.
 #[derive(Debug)]
 struct Prior {
     evidence: Evidence,
@@ -158,8 +159,8 @@ impl Prior {
     }
 }
 
-/// The frozen sigma_o and what it makes of the samples seen so far: as long as training lasts that stays the same, and takes
-/// most of an update's time.
+/// The frozen sigma_o and its beliefs after the views of the samples seen so far: they do not change during training,
+/// and computing them takes most of an update's time.
 #[derive(Debug)]
 pub struct Priors {
     observe: Cnabu,

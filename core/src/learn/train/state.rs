@@ -1,5 +1,5 @@
-//! The state of a network in training, and checkpoints of it: everything that a run needs to go on as if it had not been
-//! stopped.
+//! The state of a network in training, and checkpoints of it: everything that a run needs to continue as if it had not
+//! been stopped.
 
 use super::adam::Adam;
 use crate::cnabu::{read_tensors, write_tensors};
@@ -120,7 +120,7 @@ impl State {
         Ok(())
     }
 
-    /// Takes over weights, those in `store`, that have behind them as many updates as their card says. Adam begins anew.
+    /// Takes over the weights in `store`, with the number of updates from their card. Adam starts anew.
     pub(super) fn begin_with(&mut self, store: &VarStore, updates: u64) {
         let variables: BTreeMap<String, Tensor> = store.variables().into_iter().collect();
         tch::no_grad(|| {
@@ -155,7 +155,7 @@ pub(super) fn logged_settings<T: DeserializeOwned>(out: &Path) -> Result<T> {
     toml::from_str(&text).map_err(|error| Error::input(&path, "", error.message().to_owned()))
 }
 
-/// Refuses to go on with the run named `out` with other settings than it was begun with; names the first that differs.
+/// Refuses to continue the run named `out` with other settings than it was started with; names the first that differs.
 pub(super) fn same_settings(out: &Path, wanted: &impl Serialize) -> Result<()> {
     let path = settings_path(out);
     let there: toml::Table = logged_settings(out)?;

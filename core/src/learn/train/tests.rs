@@ -172,7 +172,7 @@ fn a_run_begins_with_finished_weights() {
 /// The shipped sigma_o learns four scenes by heart: one scene a batch for many small updates, and a step size that falls to
 /// nothing (cosine). Fresh weights are at 0.969 after 6,000 such updates and need more of them.
 #[test]
-#[ignore = "trains for twenty minutes of a core; make test-cnabu runs it"]
+#[ignore = "trains for twenty minutes of a core; --include-ignored runs it"]
 fn a_network_overfits_four_scenes() {
     const ROUNDS: usize = 170;
     let (_directory, data) = data(4);

@@ -1,4 +1,4 @@
-//! From loose triangles to closed surfaces: corners joined, holes found, winding repaired, components told apart.
+//! From loose triangles to closed surfaces: corners joined, holes found, winding repaired, components separated.
 
 use super::bounds_of;
 use crate::Point;

@@ -1,0 +1,241 @@
+//! What pushes are worth: beside what the planner promised of each candidate, what it really does.
+//!
+//! An episode is gone through again up to a decision, so that the world stands as it stood; there every feasible push
+//! candidate is carried out in a copy of the world ([`crate::push::Counterfactual`]). Over the candidates of a decision
+//! two questions are answered, once for the objects that pushes bring into sight (won minus lost) and once for the space that
+//! they open ([`Measure`]):
+//!
+//! * Does the promise order pushes as the truth does? Spearman's rank correlation of candidate gain and truth.
+//! * What does the choice cost? The regret: the best candidate's truth minus that of the one with the largest promise.
+//!
+//! The mean over the candidates stands for a push at random.
+
+mod summary;
+
+pub use summary::{Measure, MeasureSummary, StepSummary};
+
+use crate::arm::{Push, PushMotion};
+use crate::belief::BeliefUpdate;
+use crate::episode::{Difference, Episode, EpisodeDir, EpisodeRecord, StepRecord, StoredTruth, revisit};
+use crate::plan::{Action, CandidateRecord, Reason};
+use crate::push::{ArmClearance, PushTruth};
+use crate::rng::stream;
+use crate::scene::Catalog;
+use crate::world::TruthMap;
+use crate::{Error, Result};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Difference of the sums of displacements up to which a push did the same as in the episode, metres.
+const SAME_M: f64 = 1e-6;
+
+/// A push candidate with what was promised of it and what it really does.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ProbedPush {
+    /// Its position among the decision's candidates.
+    pub candidate: usize,
+    /// The push.
+    #[serde(flatten)]
+    pub push: Push,
+    /// What the planner promised, nats; `None` where it weighed none (pushes at random).
+    pub promised_gain: Option<f32>,
+    /// What it expected to blur, nats, at most 0.
+    pub promised_reg: Option<f32>,
+    /// Voxels that it opens: that no look has seen, no view reached before it and one reaches after it.
+    pub opened_voxels: usize,
+    /// Their volume, litres.
+    pub opened_l: f64,
+    /// Objects that it brings into sight, `class#id`.
+    pub won: Vec<String>,
+    /// Objects that it takes out of sight, dropped ones included, `class#id`.
+    pub lost: Vec<String>,
+    /// How far the tip came along the push, metres.
+    pub pushed_m: f32,
+    /// Whether the arm was blocked and gave up before the push's end.
+    pub jammed: bool,
+    /// Objects that left the board, `class#id`.
+    pub dropped: Vec<String>,
+    /// Objects that stood and lie then, `class#id`.
+    pub toppled: Vec<String>,
+    /// Sum of the objects' displacements, metres.
+    pub displacement_m: f64,
+}
+
+/// The pushes of one decision.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StepProbe {
+    /// The step, 1 for the first.
+    pub step: usize,
+    /// Why the decision was what it was.
+    pub reason: Reason,
+    /// Gain of the best pair of views, nats.
+    pub igv: f32,
+    /// Objects that no view shows before the step, `class#id`.
+    pub hidden: Vec<String>,
+    /// The feasible candidates, in the order drawn.
+    pub pushes: Vec<ProbedPush>,
+    /// Position in `pushes` of the one that the planner held to be best, whether or not it was made.
+    pub chosen: Option<usize>,
+    /// Position in `pushes` of the one that was made, if it is one of them.
+    pub made: Option<usize>,
+    /// Whether that one did here what it did in the episode: its objects came equally far.
+    pub agrees: Option<bool>,
+    /// Feasible candidates for which the arm has no motion now; none where the belief is that of the log.
+    pub left_out: usize,
+}
+
+/// The steps of a record whose decisions have feasible push candidates, with how many: what can be probed.
+pub fn probable_steps(record: &EpisodeRecord) -> Vec<(usize, usize)> {
+    let counted = record.steps.iter().map(|step| (step.index, feasible(step).count()));
+    counted.filter(|(_, count)| *count > 0).collect()
+}
+
+/// Checks that the decision at a step can be probed; says how many candidates it has.
+///
+/// # Errors
+/// [`Error::Input`] for a step before the first or beyond the last, and for one without a feasible push candidate: names the
+/// episode and the step.
+pub fn check_step(path: &Path, record: &EpisodeRecord, step: usize) -> Result<usize> {
+    let place = format!("step {step}");
+    let Some(logged) = step.checked_sub(1).and_then(|at| record.steps.get(at)) else {
+        let message = format!("is not in the episode, which has steps 1 to {}", record.steps.len());
+        return Err(Error::input(path, place, message.replace("steps 1 to 0", "no steps")));
+    };
+    match (feasible(logged).count(), logged.decision.candidates.len()) {
+        (0, 0) => Err(Error::input(path, place, "has no push candidates: none was weighed there")),
+        (0, drawn) => {
+            Err(Error::input(path, place, format!("has no feasible push candidate: all {drawn} were rejected")))
+        }
+        (count, _) => Ok(count),
+    }
+}
+
+/// Goes through the episode in a directory again and probes the decisions at some steps. `carried_out` is called after
+/// every push, from any thread; `each` is shown every step when it is done. Nothing is written. The second value is the
+/// first place where repeating the episode did not lead where the log says: the candidates are those of the log even so.
+///
+/// The result does not depend on the number of threads.
+///
+/// # Errors
+/// Those of [`check_step`], of reading the directory and of setting up the episode, of a scene that cannot be simulated
+/// ([`Error::Input`], which names the directory); [`Error::Check`] where bodies do not stand as they stood in the episode.
+pub fn probe(
+    directory: &EpisodeDir,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    steps: &BTreeSet<usize>,
+    carried_out: &(dyn Fn() + Sync),
+    each: &mut dyn FnMut(&StepProbe),
+) -> Result<(Vec<StepProbe>, Option<Difference>)> {
+    let (record, path) = (directory.record()?, directory.path());
+    for step in steps {
+        check_step(path, &record, *step)?;
+    }
+    record.scene.bodies(&catalog).map_err(|error| {
+        let message = format!("its scene cannot be simulated: {error}");
+        Error::input(path, "", message)
+    })?;
+    let actions = steps.last().map_or(0, |last| last - 1);
+    let mut probes = Vec::new();
+    let difference = revisit(directory, catalog, update, actions, &mut |episode, _| {
+        let done = episode.record().steps.len();
+        if steps.contains(&(done + 1)) {
+            stands_as_filed(directory, episode, done)?;
+            let probe = probe_step(episode, &record.steps[done], carried_out);
+            each(&probe);
+            probes.push(probe);
+        }
+        Ok(())
+    })?;
+    Ok((probes, difference))
+}
+
+/// Probes the decision of a step of the log, of which `episode` has done all before.
+pub fn probe_step(episode: &Episode, logged: &StepRecord, carried_out: &(dyn Fn() + Sync)) -> StepProbe {
+    let decision = &logged.decision;
+    let known = episode.counterfactual();
+    let (at, motions): (Vec<usize>, Vec<PushMotion>) = motions(episode, logged).into_iter().unzip();
+    let truths = known.of_each(&motions, carried_out);
+    let pushes: Vec<ProbedPush> =
+        at.iter().zip(truths).map(|(&at, truth)| probed(episode, at, &decision.candidates[at], truth)).collect();
+    let position = |candidate: Option<usize>| pushes.iter().position(|push| Some(push.candidate) == candidate);
+    let made = match logged.action {
+        Action::Look { .. } => None,
+        Action::Push(push) => pushes.iter().position(|probed| probed.push == push),
+    };
+    StepProbe {
+        step: logged.index,
+        reason: decision.reason,
+        igv: decision.igv,
+        hidden: known.hidden().iter().map(|id| episode.name(*id)).collect(),
+        chosen: position(decision.best_push),
+        made,
+        agrees: made.map(|at| (pushes[at].displacement_m - logged.displacement_m).abs() <= SAME_M),
+        left_out: feasible(logged).count() - pushes.len(),
+        pushes,
+    }
+}
+
+/// The feasible candidates of a step's decision, with their positions.
+fn feasible(step: &StepRecord) -> impl Iterator<Item = (usize, &CandidateRecord)> {
+    step.decision.candidates.iter().enumerate().filter(|(_, candidate)| candidate.rejection.is_none())
+}
+
+/// The arm's motion for every feasible candidate: the one that the log keeps; else the one with which the candidate is
+/// drawn again; else, where the belief is not quite that of the log, one planned anew. Candidates without any are left out.
+fn motions(episode: &Episode, logged: &StepRecord) -> Vec<(usize, PushMotion)> {
+    let (tool, seed) = (episode.arm(), episode.record().config.seed);
+    let drawn = episode.draw_pushes();
+    let clearance = ArmClearance::new(tool, episode.belief());
+    let of = |(at, candidate): (usize, &CandidateRecord)| {
+        let push = &candidate.push;
+        let kept = |motion: &&PushMotion| tool.ready.is_some_and(|ready| motion.carries_out(&tool.arm, &ready, push));
+        let again = || {
+            let drawn = drawn.get(at).filter(|drawn| drawn.swept.push == *push);
+            drawn.and_then(|drawn| drawn.motion.clone())
+        };
+        let anew = || clearance.motion(push, &clearance.target_of(push), &mut stream(seed, "probe", at as u64)).ok();
+        let motion = logged.decision.motion.as_ref().filter(kept).cloned().or_else(again).or_else(anew)?;
+        Some((at, motion))
+    };
+    feasible(logged).filter_map(of).collect()
+}
+
+fn probed(episode: &Episode, candidate: usize, promised: &CandidateRecord, truth: PushTruth) -> ProbedPush {
+    let names = |ids: &[crate::scene::ObjectId]| ids.iter().map(|id| episode.name(*id)).collect();
+    let opened_voxels = truth.opened.len();
+    ProbedPush {
+        candidate,
+        push: promised.push,
+        promised_gain: promised.gain,
+        promised_reg: promised.reg,
+        opened_voxels,
+        opened_l: 1e3 * opened_voxels as f64 * f64::from(episode.grid().voxel_m).powi(3),
+        won: names(&truth.won),
+        lost: names(&truth.lost),
+        pushed_m: truth.pushed_m,
+        jammed: truth.jammed,
+        dropped: names(&truth.dropped),
+        toppled: names(&truth.toppled),
+        displacement_m: truth.displacement_m,
+    }
+}
+
+/// Makes sure that the bodies stand as they stood after so many actions.
+fn stands_as_filed(directory: &EpisodeDir, episode: &Episode, actions: usize) -> Result<()> {
+    let now = StoredTruth::from(&TruthMap::of(&episode.grid(), &episode.bodies()));
+    if now == directory.read_truth(actions)? {
+        return Ok(());
+    }
+    let path = directory.path().display();
+    Err(Error::Check(format!(
+        "{path}: cannot be probed: before step {} the objects do not stand as they stood (written by another version, or on \
+         another machine)",
+        actions + 1
+    )))
+}
+
+#[cfg(test)]
+mod tests;

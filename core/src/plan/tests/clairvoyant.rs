@@ -26,10 +26,13 @@ fn the_clairvoyant_pushes_what_really_wins_objects_and_of_equals_what_opens_most
     // Where nothing is won the rule holds, for the space that is really opened.
     table.really = vec![[0, 0, 3], [0, 0, 500], [0, 1, 9000]];
     let decision = decide(&table);
-    assert_eq!((decision.best_push, decision.reason), (Some(nth_feasible(&decision, 1)), Reason::LookTellsMore));
-    assert!(!is_push(&decision) && (decision.igm - 500.0 * std::f32::consts::LN_2).abs() < 1e-2, "{}", decision.igm);
-    table.settings.patience = 0.9 * decision.igm / decision.igv;
-    assert_eq!(decide(&table).reason, Reason::PushTellsMore);
+    assert_eq!(decision.best_push, Some(nth_feasible(&decision, 1)));
+    assert!((decision.igm - 500.0 * std::f32::consts::LN_2).abs() < 1e-2, "{}", decision.igm);
+    for (patience, reason) in [(1.1, Reason::LookTellsMore), (0.9, Reason::PushTellsMore)] {
+        table.settings.patience = patience * decision.igm / decision.igv;
+        let decision = decide(&table);
+        assert_eq!((decision.reason, is_push(&decision)), (reason, reason == Reason::PushTellsMore));
+    }
     // A push that only hides is worth nothing, however much it opens.
     table.really = vec![[0, 1, 9000]; 6];
     let decision = decide(&table);

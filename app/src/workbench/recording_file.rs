@@ -90,9 +90,9 @@ mod tests {
         stream.send_recording_name("a name").expect("named");
         let layout = crate::record::layout::standard("", crate::picture::FloorPlan { size: [8, 4] });
         layout.send(&stream, "test").expect("layout");
-        for step in 0..3 {
+        for step in 0..3_i64 {
             stream.set_time_sequence("step", step);
-            stream.log("a", &rerun::Points3D::new([[0.0, 1.0, 2.0]])).expect("logged");
+            stream.log("a", &rerun::Points3D::new([[0.0_f32, 1.0, 2.0]])).expect("logged");
             stream.flush_blocking().expect("flushed");
         }
         stream.disconnect();

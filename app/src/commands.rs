@@ -193,7 +193,9 @@ fn warn(message: &str) {
 #[cfg(test)]
 mod tests {
     use super::Cli;
-    use clap::{CommandFactory, Parser};
+    use clap::CommandFactory;
+    #[cfg(not(feature = "workbench"))]
+    use clap::Parser;
 
     #[test]
     fn help_lists_the_windows_commands_in_every_build() {

@@ -33,6 +33,8 @@ pub use loss::{LossForm, expected_log_loss, kl_to_uniform, marginal_log_loss, oc
 #[cfg(feature = "cnabu")]
 pub use net::Network;
 #[cfg(feature = "cnabu")]
+pub(crate) use net::seeded;
+#[cfg(feature = "cnabu")]
 pub use observe_net::{Evidence, ObserveNet};
 #[cfg(feature = "cnabu")]
 pub(crate) use predict::{Numbers, Windowed, push_planes};

@@ -1,5 +1,6 @@
 //! The parts that both networks are built of: residual blocks and a U-Net of four levels.
 
+use std::sync::{Mutex, PoisonError};
 use tch::Tensor;
 use tch::nn::{self, Module};
 
@@ -10,6 +11,17 @@ pub trait Network: Sized {
 
     /// The network with its variables under `path`; `width` is the channels of the U-Net's first level, a multiple of 8.
     fn new(path: &nn::Path<'_>, width: i64) -> Self;
+}
+
+/// A network with fresh weights, drawn with `seed`, or by another draw of it.
+///
+/// libtorch has one stream of random numbers for the whole process: without this lock two networks that are made at once
+/// would share it, and neither would have the weights of its seed.
+pub(crate) fn seeded<T>(seed: i64, draw: impl FnOnce() -> T) -> T {
+    static DRAWING: Mutex<()> = Mutex::new(());
+    let _drawing = DRAWING.lock().unwrap_or_else(PoisonError::into_inner);
+    tch::manual_seed(seed);
+    draw()
 }
 
 /// Groups of the group norms.

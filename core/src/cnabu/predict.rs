@@ -296,8 +296,7 @@ mod tests {
     fn heads_at_some_pixels_are_those_of_the_whole_window() {
         let (batch, across) = (3, 8_i64);
         let store = tch::nn::VarStore::new(Device::Cpu);
-        tch::manual_seed(1);
-        let net = PushNet::new(&store.root(), 8);
+        let net = crate::cnabu::seeded(1, || PushNet::new(&store.root(), 8));
         let random = |channels: usize| Tensor::rand([batch, channels as i64, 16, across], (Kind::Float, Device::Cpu));
         let evidence = || Evidence { occupancy: random(2 * OCCUPANCY), semantics: random(SEMANTICS) };
         let planes = PushPlanes { swept: random(OCCUPANCY), marks: random(MARKS), arriving: evidence() };

@@ -328,9 +328,8 @@ mod tests {
     /// Shelves whose planes need padding lost the second opinion of the mirror image, without a word.
     #[test]
     fn a_mirrored_shelf_gets_the_mirrored_posterior_padded_or_not() {
-        tch::manual_seed(3);
         let store = VarStore::new(Device::Cpu);
-        let net = ObserveNet::new(&store.root(), 8);
+        let net = crate::cnabu::seeded(3, || ObserveNet::new(&store.root(), 8));
         let update = Cnabu::of(net, store, Card::new("sigma_o", 8, 0));
         // No padding; padding along x with an even and with an odd number of floor cells; padding along y alone.
         for (size, padded) in [

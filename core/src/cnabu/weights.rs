@@ -2,7 +2,7 @@
 
 use super::Scored;
 use super::layout::LEVELS;
-use super::net::Network;
+use super::net::{Network, seeded};
 use crate::files::{target_of, temporary_of, write_atomically};
 use crate::scene::{CLASS_COUNT, Catalog};
 use crate::{Error, Result};
@@ -218,7 +218,7 @@ fn one_line(error: &tch::TchError) -> String {
 pub fn load_network<N: Network>(path: &Path, device: Device) -> Result<(N, VarStore, Card)> {
     let card = Card::read(path, N::NAME)?;
     let store = VarStore::new(device);
-    let net = N::new(&store.root(), card.width);
+    let net = seeded(0, || N::new(&store.root(), card.width));
     fill(&store, &read_tensors(path)?, path)?;
     Ok((net, store, card))
 }

@@ -21,7 +21,7 @@ pub use push::{Priors, PushLoss, PushTrainer};
 pub use state::{checkpoint_path, settings_path};
 
 use super::VIEWS;
-use crate::cnabu::{Card, Layout, Network, load_network};
+use crate::cnabu::{Card, Layout, Network, load_network, seeded};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use state::State;
@@ -119,9 +119,8 @@ impl<N: Network> Trainer<N> {
         if layout.is_padded() {
             return Err(Error::Usage("training wants a floor plan of a multiple of 16 cells along x and y".to_owned()));
         }
-        tch::manual_seed(settings.seed as i64);
         let store = VarStore::new(device);
-        let net = N::new(&store.root(), settings.width);
+        let net = seeded(settings.seed as i64, || N::new(&store.root(), settings.width));
         let state = State::new(&store);
         Ok(Self { settings, layout, net, store, state })
     }
@@ -210,7 +209,7 @@ impl<N: Network> Trainer<N> {
     /// The network with the running mean of the weights, and its variables.
     fn mean_net(&self) -> (N, VarStore) {
         let store = VarStore::new(self.store.device());
-        let net = N::new(&store.root(), self.settings.width);
+        let net = seeded(0, || N::new(&store.root(), self.settings.width));
         self.state.copy_mean(&store);
         (net, store)
     }

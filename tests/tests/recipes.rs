@@ -66,7 +66,8 @@ fn the_makefile_trains_on_the_data_and_with_the_settings_that_the_cards_tell() {
             let typed = words.find(|word| *word == option).and_then(|_| words.next());
             // sigma_m's views are those of its samples; no option says how many.
             if (target, name) != ("train-push", "max_views") {
-                assert_eq!(typed, Some(told.as_str()), "{option} of {target}, {name} of {card}");
+                let number = |text: &str| text.parse::<f64>().expect("a number");
+                assert_eq!(typed.map(number), Some(number(told)), "{option} of {target}, {name} of {card}");
             }
         }
     }

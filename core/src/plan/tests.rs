@@ -376,7 +376,8 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
     assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
     let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
-    let opened = Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(&[prediction.clone()])[0];
+    let opened =
+        Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(std::slice::from_ref(&prediction))[0];
     let sources = push_sources(Counted::Unseen, &field, &table.views, &ids, &prediction, None);
     let sum: f32 = sources.iter().map(|(_, nats)| nats).sum();
     assert!((sum - opened).abs() < 1e-3 * opened, "what the push opens is told by voxel: {sum}, {opened}");

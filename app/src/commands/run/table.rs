@@ -100,8 +100,11 @@ pub(super) fn summary(columns: &[Column]) {
     line("written to", columns, |column| column.out.display().to_string());
 }
 
+/// The seconds that a part of a step took.
+type Seconds = fn(&StepRecord) -> f64;
+
 /// Where the time of an episode went; the rest is reading the scene and the weights.
-const PARTS: [(&str, fn(&StepRecord) -> f64); 4] = [
+const PARTS: [(&str, Seconds); 4] = [
     ("decide", |step| step.seconds.decide),
     ("act", |step| step.seconds.act),
     ("update", |step| step.seconds.update),

@@ -273,8 +273,11 @@ fn generate(ui: &mut egui::Ui, author: &mut Author) {
         }
         ui.end_row();
         ui.label("Regularity").on_hover_text("0 places freely, 1 lines objects up behind each other");
-        named(ui.add(egui::Slider::new(&mut author.fill.rho, 0.0..=1.0).fixed_decimals(1)), "Regularity")
-            .on_hover_text("0 to 1: ρ of the generator, --rho on the command line");
+        named(
+            ui.add(egui::Slider::new(&mut author.fill.rho, 0.0..=1.0).fixed_decimals(1).text("lined up")),
+            "Regularity",
+        )
+        .on_hover_text("0 to 1: ρ of the generator, --rho on the command line");
         ui.end_row();
         ui.label("Seed").on_hover_text("Of every random choice; one more after each use");
         named(ui.add(DragValue::new(&mut author.fill.seed).speed(0.1)), "Seed")

@@ -144,7 +144,7 @@ fn an_obj_was_refused_for_what_is_not_its_shape() {
 /// A GLB: its JSON and its binary part.
 fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {
     let mut json = json.to_string();
-    while json.len() % 4 != 0 {
+    while !json.len().is_multiple_of(4) {
         json.push(' ');
     }
     let mut bytes = b"glTF".to_vec();

@@ -11,7 +11,9 @@ mod data;
 mod doctor;
 mod manual;
 mod mesh;
-#[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
+#[cfg(not(feature = "workbench"))]
+mod no_window;
+#[cfg(feature = "workbench")]
 mod open;
 mod probe;
 mod progress;
@@ -22,10 +24,13 @@ mod robot;
 mod run;
 mod scene;
 mod settings;
-#[cfg_attr(not(feature = "workbench"), path = "commands/no_window.rs")]
+#[cfg(feature = "workbench")]
 mod shot;
 mod train;
 mod views;
+
+#[cfg(not(feature = "workbench"))]
+use no_window::{self as open, self as shot};
 
 /// Manipulation-enhanced mapping of cluttered shelves: look, push, and know how sure you are.
 #[derive(Parser)]

@@ -124,7 +124,7 @@ pub fn set_threads(threads: usize) {
 }
 
 /// Has libtorch compute on the thread that asks, as rayon's threads share the work; once, before weights are loaded.
-/// (Training has libtorch's own threads: [`set_threads`].)
+/// (Training has libtorch's own threads: `set_threads`.)
 pub fn compute_beside_rayon() {
     #[cfg(feature = "cnabu")]
     set_threads(1);

@@ -1,11 +1,11 @@
 //! A scripted episode for tests: real images, real pushes and the classical belief, with made-up gains.
 
 use nudge_core::arm::ArmTool;
-use nudge_core::belief::{Belief, BeliefUpdate, Classical, SweptPush};
+use nudge_core::belief::{Belief, BeliefUpdate, Classical, FloorPlan, SOLID};
 use nudge_core::camera::{self, ViewArray, ViewId};
 use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
-use nudge_core::push::{PushSampler, sample};
+use nudge_core::skill::push::{PushSampler, sample};
 use nudge_core::rng;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::score::{Scores, object_verdicts};
@@ -61,20 +61,22 @@ pub fn play(steps: usize) -> Played {
                         gain: feasible.then_some(900.0 - 7.0 * rank),
                         view: feasible.then_some(ViewId(rank as u16 * 3)),
                         reg: feasible.then_some(-3.0 * rank),
-                        ..CandidateRecord::of(c.swept.push)
+                        ..CandidateRecord::of(c.manipulation)
                     }
                 })
                 .collect();
             decision.best_push = candidates.iter().position(|c| c.rejection.is_none());
             if let Some(best) = decision.best_push {
-                let swept: SweptPush = candidates[best].swept.clone();
-                let prediction = Classical.predict_pushes(&belief, std::slice::from_ref(&swept)).remove(0);
-                decision.action = Action::Push(swept.push);
+                let (of, swept) = (candidates[best].manipulation, candidates[best].swept.clone());
+                let solid = FloorPlan::new(&belief, SOLID);
+                let intervention = of.skill().intervention(&belief, &solid, &arm.arm, swept);
+                let prediction = Classical.predict(&belief, std::slice::from_ref(&intervention)).remove(0);
+                decision.action = Action::Manipulate(of);
                 decision.reason = Reason::PushTellsMore;
                 let pushed = world.execute(&arm.arm, candidates[best].motion.as_ref().expect("of a feasible one"));
                 belief.apply(&prediction);
                 truth = TruthMap::of(&grid, &world.bodies());
-                outcome = Some((swept, prediction, pushed));
+                outcome = Some((intervention, prediction, pushed));
             }
         }
         let mut image = None;
@@ -99,17 +101,17 @@ pub fn play(steps: usize) -> Played {
             seconds: StepSeconds::default(),
         };
         played.record.steps.push(step.clone());
-        let (swept, prediction, push_outcome) = match outcome {
-            Some((swept, prediction, pushed)) => (Some(swept), Some(prediction), Some(pushed)),
+        let (intervention, prediction, manipulated) = match outcome {
+            Some((told, prediction, pushed)) => (Some(told), Some(prediction), Some(pushed)),
             None => (None, None, None),
         };
         played.outcomes.push(StepOutcome {
             record: step,
             image,
             observation,
-            swept,
+            intervention,
             prediction,
-            push_outcome,
+            manipulated,
             motion: None,
         });
         played.bodies.push(world.bodies());

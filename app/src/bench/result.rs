@@ -163,7 +163,7 @@ impl EpisodeResult {
 
     /// Number of pushes.
     pub fn pushes(&self) -> usize {
-        self.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).count()
+        self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).count()
     }
 
     /// Number of pushes that dropped something.
@@ -187,7 +187,7 @@ impl StepResult {
     fn new(step: &StepRecord) -> Self {
         let gain = match step.action {
             Action::Look { view } => step.decision.gains.get(usize::from(view.0)).copied(),
-            Action::Push(_) => None,
+            Action::Manipulate(_) => None,
         };
         Self {
             action: step.action,

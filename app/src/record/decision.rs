@@ -3,8 +3,8 @@
 use super::Setting;
 use nudge_core::episode::StepRecord;
 use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, Reason};
-use nudge_core::push::Rejection;
 use nudge_core::score::Scores;
+use nudge_core::skill::{Manipulation, Rejection, SkillKind};
 use std::fmt::Write as _;
 
 /// One score over the steps.
@@ -97,7 +97,8 @@ pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
     let mut words: Vec<String> = record.dropped.iter().map(|name| format!("dropped {name}")).collect();
     if let Some(push) = &record.push {
         if push.stalled {
-            words.push(format!("the arm was blocked after {} of its push", length(record).unwrap_or_default()));
+            let name = manipulated(record).map_or("way", |manipulation| manipulation.kind().name());
+            words.push(format!("the arm was blocked after {} of its {name}", length(record).unwrap_or_default()));
         }
         words.extend(push.contacts.iter().map(|touch| format!("the arm's {} touched {}", touch.link, touch.object)));
         words.extend(push.against_wall.iter().map(|name| format!("{name} was pressed against a wall")));
@@ -105,10 +106,17 @@ pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
     words
 }
 
-/// How far a push went of what was planned: `50 of 140 mm`; of an episode that does not tell, what was planned.
+/// The manipulation that a step did.
+fn manipulated(record: &StepRecord) -> Option<Manipulation> {
+    match record.action {
+        Action::Manipulate(manipulation) => Some(manipulation),
+        Action::Look { .. } => None,
+    }
+}
+
+/// How far a manipulation went of what was planned: `50 of 140 mm`; of an episode that does not tell, what was planned.
 pub(crate) fn length(record: &StepRecord) -> Option<String> {
-    let Action::Push(planned) = record.action else { return None };
-    let planned_mm = planned.length_m * 1e3;
+    let planned_mm = manipulated(record)?.skill().way_m() * 1e3;
     Some(match &record.push {
         Some(push) => format!("{:.0} of {planned_mm:.0} mm", push.pushed_m * 1e3),
         None => format!("{planned_mm:.0} mm"),
@@ -119,7 +127,7 @@ pub(crate) fn length(record: &StepRecord) -> Option<String> {
 pub(crate) fn action(action: &Action) -> String {
     match action {
         Action::Look { view } => format!("look from view {}", view.0),
-        Action::Push(push) => format!("push {:.0} mm towards {:.0}°", push.length_m * 1e3, push.direction_deg),
+        Action::Manipulate(manipulation) => manipulation.describe().words,
     }
 }
 
@@ -154,7 +162,9 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     );
     weighed(&mut page, decision, setting);
     views(&mut page, setting, decision);
-    pushes(&mut page, decision, setting.planner.gamma);
+    for kind in SkillKind::ALL {
+        manipulations(&mut page, decision, *kind, setting.planner.gamma);
+    }
     let scores = &record.scores;
     let _ = write!(
         page,
@@ -206,42 +216,47 @@ fn views(page: &mut String, setting: &Setting<'_>, decision: &Decision) {
     page.push_str("\n● best pair\n\n");
 }
 
-fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
-    if decision.candidates.is_empty() {
+/// The candidates of a skill.
+fn manipulations(page: &mut String, decision: &Decision, kind: SkillKind, gamma: f32) {
+    let all = || decision.candidates.iter().enumerate().filter(|(_, c)| c.manipulation.kind() == kind);
+    if all().next().is_none() {
         return;
     }
     let value = |c: &CandidateRecord| c.gain.map(|gain| gain + gamma * c.reg.unwrap_or(0.0));
     let mut feasible: Vec<(usize, f32, &CandidateRecord)> =
-        decision.candidates.iter().enumerate().filter_map(|(at, c)| Some((at, value(c)?, c))).collect();
+        all().filter_map(|(at, c)| Some((at, value(c)?, c))).collect();
     feasible.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let count = |is: fn(&Rejection) -> bool| {
-        decision.candidates.iter().filter(|c| c.rejection.as_ref().is_some_and(is)).count()
-    };
+    let count = |is: fn(&Rejection) -> bool| all().filter(|(_, c)| c.rejection.as_ref().is_some_and(is)).count();
     let _ = write!(
         page,
-        "**Pushes**: {} drawn, {} feasible; {} without a target, {} out of reach, {} blocked, {} without a free way\n\n",
-        decision.candidates.len(),
+        "**{}**: {} drawn, {} feasible; {} without a target, {} out of reach, {} blocked, {} without a free way\n\n",
+        capital(kind.plural()),
+        all().count(),
         feasible.len(),
         count(|r| matches!(r, Rejection::NoTarget)),
         count(|r| matches!(r, Rejection::Unreachable { .. })),
         count(|r| matches!(r, Rejection::ArmBlocked { .. })),
         count(|r| matches!(r, Rejection::NoWay)),
     );
-    reasons(page, decision);
-    if feasible.is_empty() {
-        return;
+    let rejections = all().filter_map(|(_, c)| c.rejection.as_ref().map(|rejection| rejection.kind_words(kind)));
+    reasons(page, rejections);
+    let Some((_, _, first)) = feasible.first() else { return };
+    let mut numbers = String::new();
+    for parameter in &first.manipulation.describe().parameters {
+        let _ = write!(numbers, " {}, {} |", parameter.name, parameter.sign());
     }
-    page.push_str(
-        "| push | from x, y (m) | towards | length | arm | gain | Reg | value, nats |\n|--:|:--|--:|--:|--:|--:|--:|--:|\n",
-    );
+    let lines = "--:|".repeat(numbers.matches('|').count());
+    let name = kind.name();
+    let _ = write!(page, "| {name} |{numbers} arm | gain | Reg | value, nats |\n|--:|{lines}--:|--:|--:|--:|\n");
     for (at, value, c) in feasible.iter().take(LISTED) {
         let best = if decision.best_push == Some(*at) { " ●" } else { "" };
-        let [x, y, _] = c.push.start;
+        let _ = write!(page, "| {at}{best} |");
+        for parameter in c.manipulation.describe().parameters {
+            let _ = write!(page, " {} |", parameter.number());
+        }
         let _ = writeln!(
             page,
-            "| {at}{best} | {x:.2}, {y:.2} | {:.0}° | {:.0} mm | {:.1} s | {:.1} | {:.1} | {value:.1} |",
-            c.push.direction_deg,
-            c.push.length_m * 1e3,
+            " {:.1} s | {:.1} | {:.1} | {value:.1} |",
             c.motion_s.unwrap_or(0.0),
             c.gain.unwrap_or(0.0),
             c.reg.unwrap_or(0.0)
@@ -251,10 +266,10 @@ fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
 }
 
 /// The commonest reasons why candidates were rejected.
-fn reasons(page: &mut String, decision: &Decision) {
+fn reasons(page: &mut String, rejections: impl Iterator<Item = String>) {
     let mut counts = std::collections::BTreeMap::<String, usize>::new();
-    for rejection in decision.candidates.iter().filter_map(|candidate| candidate.rejection.as_ref()) {
-        *counts.entry(rejection.kind_words()).or_default() += 1;
+    for words in rejections {
+        *counts.entry(words).or_default() += 1;
     }
     let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
     counts.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
@@ -286,8 +301,9 @@ pub(crate) fn thousands(number: f64) -> String {
 mod tests {
     use super::*;
     use crate::fixture;
-    use nudge_core::arm::{ArmTool, Push};
+    use nudge_core::arm::ArmTool;
     use nudge_core::episode::PushReport;
+    use nudge_core::skill::Push;
 
     #[test]
     fn the_page_of_a_push_shows_what_it_had_to_promise() {
@@ -295,7 +311,7 @@ mod tests {
         let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 };
         let (mut record, arm) = (played.record.steps[3].clone(), ArmTool::standard(played.record.scene.shelf));
         record.decision = Decision {
-            action: Action::Push(push),
+            action: Action::Manipulate(push.into()),
             reason: Reason::PushTellsMore,
             igv: 30.0,
             igm: 400.0,
@@ -326,7 +342,7 @@ mod tests {
         let played = fixture::play(1);
         let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.14 };
         let mut record = played.record.steps[0].clone();
-        record.action = Action::Push(push);
+        record.action = Action::Manipulate(push.into());
         record.push = Some(PushReport {
             pushed_m: 0.05,
             stalled: true,

@@ -37,8 +37,8 @@ impl Gain {
 /// own measure under the prediction that changed the belief. `None` where the action promised nothing or was not weighed.
 pub fn of(setting: &Setting<'_>, field: &GainField, outcome: &StepOutcome) -> Option<Gain> {
     let record = &outcome.record;
-    let push = match record.action {
-        Action::Push(push) => push,
+    let done = match record.action {
+        Action::Manipulate(manipulation) => manipulation,
         Action::Look { view } => {
             let nats = gain_sources(field, setting.views, view, RayDensity::FULL);
             return Gain::new(&format!("Gain of the look from view {}", view.0), nats);
@@ -47,7 +47,7 @@ pub fn of(setting: &Setting<'_>, field: &GainField, outcome: &StepOutcome) -> Op
     let prediction = outcome.prediction.as_ref()?;
     let offered: Vec<ViewId> = setting.views.views.iter().map(|view| view.id).collect();
     let offered: Vec<ViewId> = offered.into_iter().filter(|view| !setting.unreachable.contains(view)).collect();
-    let best = record.decision.candidates.iter().find(|candidate| candidate.push == push)?.view;
+    let best = record.decision.candidates.iter().find(|candidate| candidate.manipulation == done)?.view;
     let counted = setting.planner.counted;
     let nats = push_sources(counted, field, setting.views, &offered, prediction, best);
     let what = match (counted, best) {
@@ -57,5 +57,5 @@ pub fn of(setting: &Setting<'_>, field: &GainField, outcome: &StepOutcome) -> Op
     };
     let stalled = record.push.as_ref().is_some_and(|report| report.stalled);
     let far = if stalled { format!(", as far as it went ({})", length(record)?) } else { String::new() };
-    Gain::new(&format!("Worth of the push{far}, {what}"), nats)
+    Gain::new(&format!("Worth of the {}{far}, {what}", done.kind().name()), nats)
 }

@@ -16,7 +16,7 @@ use crate::colors::{self, Colormap, Rgb};
 use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::colored;
-use nudge_core::Pose;
+use nudge_core::{Point, Pose};
 use nudge_core::belief::Belief;
 use nudge_core::camera::ViewId;
 use nudge_core::grid::Grid;
@@ -46,6 +46,8 @@ pub mod at {
     pub const CANDIDATES: &str = "push/candidates";
     /// The push that was done or is looked at.
     pub const CHOSEN: &str = "push/chosen";
+    /// How the tool stands at the beginning of it, where its skill tells.
+    pub const LINES: &str = "push/lines";
     /// What it sweeps.
     pub const SWEPT: &str = "push/swept";
     /// The belief that it is predicted to leave.
@@ -391,9 +393,12 @@ impl Painter {
         if self.differs(at::HOVERED, format!("{:?} {:?} {:?}", side.id, space.hovered, space.view)) {
             let strips = match space.hovered {
                 Hovered::View(view) => frustum(side, Some(view), 0.16, [255, 255, 255]),
-                Hovered::Push(push) => {
-                    let (from, to) = (push.start_point(), push.end_point());
-                    rerun::LineStrips3D::new([[<[f32; 3]>::from(from.coords), to.coords.into()]])
+                Hovered::Manipulation(manipulation) => {
+                    let outline = manipulation.outline();
+                    let ways = outline.arrows.iter().map(|arrow| vec![arrow.start, arrow.end()]);
+                    let strip =
+                        |line: Vec<Point>| line.iter().map(|p| <[f32; 3]>::from(p.coords)).collect::<Vec<_>>();
+                    rerun::LineStrips3D::new(ways.chain(outline.lines.iter().cloned()).map(strip))
                         .with_colors([rerun::Color::from([255, 255, 255])])
                         .with_radii([0.006_f32])
                 }

@@ -40,7 +40,7 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -
         LayoutKind::Episode | LayoutKind::Why => view(
             "Belief",
             &[
-                &[at::BELIEF, at::OBJECTS, at::VIEWS, at::CURRENT, at::CANDIDATES, at::CHOSEN, at::ARM, at::ARM_PATH],
+                &[at::BELIEF, at::OBJECTS, at::VIEWS, at::CURRENT, at::CANDIDATES, at::CHOSEN, at::LINES, at::ARM, at::ARM_PATH],
                 &pointer[..],
             ]
             .concat(),
@@ -58,25 +58,25 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -
                         view(
                             "Now",
                             &[
-                                &[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN, at::ARM, at::ARM_PATH],
+                                &[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN, at::LINES, at::ARM, at::ARM_PATH],
                                 &pointer[..],
                             ]
                             .concat(),
                         ),
                     ),
-                    (1.0, view("Predicted", &[at::PREDICTED, at::SWEPT, at::CHOSEN])),
+                    (1.0, view("Predicted", &[at::PREDICTED, at::SWEPT, at::CHOSEN, at::LINES])),
                 ]),
             ),
             (
                 1.0,
                 Part::Row(vec![
-                    (1.0, view("Difference", &[at::DIFFERENCE, at::CHOSEN, at::PICKED])),
-                    (1.0, view("What happened", &[at::HAPPENED, at::HAPPENED_NOTE, at::CHOSEN])),
+                    (1.0, view("Difference", &[at::DIFFERENCE, at::CHOSEN, at::LINES, at::PICKED])),
+                    (1.0, view("What happened", &[at::HAPPENED, at::HAPPENED_NOTE, at::CHOSEN, at::LINES])),
                 ]),
             ),
         ]),
         LayoutKind::Compare => Part::Row(vec![
-            (1.0, view("A", &[at::BELIEF, at::OBJECTS, at::CHOSEN, at::PICKED])),
+            (1.0, view("A", &[at::BELIEF, at::OBJECTS, at::CHOSEN, at::LINES, at::PICKED])),
             (1.0, view("B", &[at::OTHER, at::OTHER_OBJECTS])),
             (1.0, view("A - B", &[at::BETWEEN, at::OBJECTS, at::PICKED])),
         ]),

@@ -1,6 +1,6 @@
 //! Where in an empty shelf the level gripper can be.
 
-use super::pusher::ArmTool;
+use super::tool::ArmTool;
 use super::ready::level_tool;
 use nalgebra::Point3;
 use rayon::prelude::*;

@@ -4,17 +4,17 @@ use super::npz::StoredTruth;
 use super::record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
-use crate::arm::{Arm, ArmTool, HandPose, Motion, Push, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, SweptPush, look};
+use crate::arm::{Arm, ArmTool, HandPose, Motion, PhasedMotion};
+use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction, Sightings, look};
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet};
 use crate::made_by::{Build, MadeBy};
 use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
-use crate::push::{ArmClearance, Candidate, Counterfactual};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::score::{Scores, object_verdicts};
-use crate::world::{PushOutcome, TruthMap, World};
+use crate::skill::{ArmClearance, Candidate, Counterfactual, Ground, Manipulation};
+use crate::world::{ManipulationOutcome, TruthMap, World};
 use crate::{Error, Result};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -122,7 +122,7 @@ impl Episode {
             }
             None => (*self.belief).clone(),
         };
-        let really_push = |motions: &[PushMotion]| self.counterfactual().of_each(motions, &|| ());
+        let really_push = |motions: &[PhasedMotion]| self.counterfactual().of_each(motions, &|| ());
         let situation = Situation {
             belief: &self.belief,
             update: &*self.update,
@@ -146,8 +146,8 @@ impl Episode {
     /// [`Episode::decide`] before.
     ///
     /// # Errors
-    /// [`Error::Usage`] past the budget, for a view that the array does not have, for a push that is no finite motion or
-    /// that the arm cannot carry out, and for a push after an object was dropped. The episode is then as it was.
+    /// [`Error::Usage`] past the budget, for a view that the array does not have, for a manipulation that is no finite motion
+    /// or that the arm cannot carry out, and for one after an object was dropped. The episode is then as it was.
     pub fn act(&mut self, decision: Decision) -> Result<StepOutcome> {
         if self.is_finished() {
             return Err(Error::Usage(format!("the budget of {} actions is used up", self.record.config.budget)));
@@ -156,7 +156,7 @@ impl Episode {
         let action = decision.action;
         match action {
             Action::Look { view } => self.look(decision, view, seconds),
-            Action::Push(push) => self.push(decision, push, seconds),
+            Action::Manipulate(manipulation) => self.manipulate(decision, manipulation, seconds),
         }
     }
 
@@ -180,32 +180,37 @@ impl Episode {
             record,
             image: Some(image),
             observation: Some(observation),
-            swept: None,
+            intervention: None,
             prediction: None,
-            push_outcome: None,
+            manipulated: None,
             motion,
         })
     }
 
-    fn push(&mut self, mut decision: Decision, push: Push, mut seconds: StepSeconds) -> Result<StepOutcome> {
+    fn manipulate(
+        &mut self,
+        mut decision: Decision,
+        manipulation: Manipulation,
+        mut seconds: StepSeconds,
+    ) -> Result<StepOutcome> {
+        let name = manipulation.kind().name();
         if self.history.dropped {
-            return Err(Error::Usage("an object was dropped: this episode pushes no more".to_owned()));
+            return Err(Error::Usage(format!("an object was dropped: this episode {} no more", manipulation.kind().plural())));
         }
-        let numbers = [push.start[0], push.start[1], push.start[2], push.direction_deg, push.length_m];
-        if !numbers.iter().all(|number| number.is_finite()) || push.length_m < 0.0 {
-            return Err(Error::Usage(format!("a push must be a finite motion, not {numbers:?}")));
+        if !manipulation.skill().is_finite() {
+            return Err(Error::Usage(format!("a {name} must be a finite motion, not {manipulation:?}")));
         }
         let started = Instant::now();
         let arm = self.arm.clone();
-        let motion = self.motion_for(&arm, &mut decision, &push)?;
+        let motion = self.motion_for(&arm, &mut decision, &manipulation)?;
         let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
         let outcome = self.world.execute(&arm.arm, &motion);
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         // The arm knows how far it came: what it did not sweep is not believed to be free.
-        let swept = SweptPush::done(&push, &outcome, &arm.arm, &self.grid());
-        let prediction = self.predict(&swept, decision.reason);
+        let intervention = manipulation.done(&outcome, &arm.arm, &self.belief);
+        let prediction = self.predict(&intervention, decision.reason);
         match &prediction {
             Some(prediction) => {
                 Arc::make_mut(&mut self.belief).apply(prediction);
@@ -226,27 +231,30 @@ impl Episode {
             record,
             image: None,
             observation: None,
-            swept: Some(swept),
+            intervention: Some(intervention),
             prediction,
-            push_outcome: Some(outcome),
+            manipulated: Some(outcome),
             motion: Some(to_wait.then(&motion.whole(&arm.arm))),
         })
     }
 
-    /// The arm's motion for a push: the decision's if it is for this push, else a new one, which the decision then keeps.
-    fn motion_for(&self, arm: &ArmTool, decision: &mut Decision, push: &Push) -> Result<PushMotion> {
+    /// The arm's motion for a manipulation: the decision's if it is for this one, else a new one, which the decision then
+    /// keeps.
+    fn motion_for(&self, arm: &ArmTool, decision: &mut Decision, wanted: &Manipulation) -> Result<PhasedMotion> {
+        let skill = wanted.skill();
         let kept = decision
             .motion
             .take()
-            .filter(|motion| arm.ready.is_some_and(|ready| motion.carries_out(&arm.arm, &ready, push)));
+            .filter(|motion| arm.ready.is_some_and(|ready| skill.is_done_by(motion, &arm.arm, &ready)));
         let motion = match kept {
             Some(motion) => motion,
             None => {
                 let clearance = ArmClearance::new(arm, &self.belief);
                 let mut rng = stream(self.record.config.seed, "push by hand", self.record.steps.len() as u64);
-                clearance
-                    .motion(push, &clearance.target_of(push), &mut rng)
-                    .map_err(|reason| Error::Usage(format!("the arm cannot carry this push out: {reason}")))?
+                skill.plan(&clearance, &mut rng).map_err(|reason| {
+                    let (name, reason) = (wanted.kind().name(), wanted.against(&reason));
+                    Error::Usage(format!("the arm cannot carry this {name} out: {reason}"))
+                })?
             }
         };
         decision.motion = Some(motion.clone());
@@ -262,13 +270,13 @@ impl Episode {
         Some(motion)
     }
 
-    fn report(&self, outcome: &PushOutcome) -> PushReport {
+    fn report(&self, outcome: &ManipulationOutcome) -> PushReport {
         let touch = |contact: &crate::world::LinkContact| LinkTouch {
             link: contact.link.clone(),
             object: self.name(contact.object),
         };
         PushReport {
-            pushed_m: outcome.pushed_m,
+            pushed_m: outcome.way_m,
             stalled: outcome.stalled,
             contacts: outcome.link_contacts.iter().map(touch).collect(),
             against_wall: outcome.against_wall.iter().map(|id| self.name(*id)).collect(),
@@ -282,11 +290,11 @@ impl Episode {
         format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
     }
 
-    /// The prediction that becomes the belief after a push, for policies that predict pushes and for pushes that a
+    /// The prediction that becomes the belief after a manipulation, for policies that predict them and for those that a
     /// person chose; `None` for the other policies.
-    fn predict(&self, swept: &SweptPush, reason: Reason) -> Option<PushPrediction> {
+    fn predict(&self, intervention: &Intervention, reason: Reason) -> Option<Prediction> {
         (self.record.config.policy.predicts_pushes() || reason == Reason::Manual)
-            .then(|| self.update.predict_pushes(&self.belief, std::slice::from_ref(swept)).pop())
+            .then(|| self.update.predict(&self.belief, std::slice::from_ref(intervention)).pop())
             .flatten()
     }
 
@@ -435,11 +443,13 @@ impl Episode {
         Counterfactual::new(&self.world, &self.arm, &self.views, self.sightings.seen())
     }
 
-    /// The push candidates that a decision to be made now draws, whatever the policy makes of them.
-    pub fn draw_pushes(&self) -> Vec<Candidate> {
+    /// The candidates that a decision to be made now draws, whatever the policy makes of them.
+    pub fn draw_candidates(&self) -> Vec<Candidate> {
         let config = &self.record.config;
         let actions = self.history.actions.len();
-        plan::draw_pushes(&config.planner, &self.belief, self.seen(), &self.arm, config.seed, actions)
+        let ground =
+            Ground { belief: &self.belief, seen: self.seen(), arm: &self.arm, sampler: config.planner.push_sampler };
+        plan::draw_candidates(&config.planner, &ground, config.seed, actions)
     }
 
     /// How the belief changes.

@@ -1,13 +1,13 @@
 //! What is kept of an episode: its configuration, its steps, and `episode.json` as a whole.
 
 use crate::arm::Motion;
-use crate::belief::{BeliefUpdate, PushPrediction, SweptPush};
+use crate::belief::{BeliefUpdate, Intervention, Prediction};
 use crate::camera::{Image, MapObservation, NoiseModel};
 use crate::made_by::MadeBy;
 use crate::plan::{Action, Decision, PlannerSettings, PolicyKind};
 use crate::scene::Scene;
 use crate::score::{ObjectVerdict, Scores};
-use crate::world::PushOutcome;
+use crate::world::ManipulationOutcome;
 use serde::{Deserialize, Serialize};
 
 /// The format number of `episode.json`.
@@ -73,19 +73,19 @@ pub struct StepRecord {
     /// How long the robot moved in this step, seconds of its own time; 0 where no arm could be there.
     #[serde(default)]
     pub motion_s: f64,
-    /// What the arm met, after a push.
+    /// What the arm met, after a manipulation of whatever skill.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub push: Option<PushReport>,
     /// Where the time went.
     pub seconds: StepSeconds,
 }
 
-/// What became of a push by the arm.
+/// What became of a manipulation by the arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PushReport {
-    /// How far the tip really moved along the push, metres.
+    /// How far the tip really moved in contact, metres.
     pub pushed_m: f32,
-    /// Whether the arm was blocked and gave up before the push's end.
+    /// Whether the arm was blocked and gave up before the contact's end.
     pub stalled: bool,
     /// Links (not the gripper) that touched an object, each with the object as `class#id`.
     pub contacts: Vec<LinkTouch>,
@@ -158,7 +158,7 @@ impl EpisodeRecord {
 
     /// The numbers of actions after which there is a truth: 0 and every push.
     pub fn truth_indices(&self) -> impl Iterator<Item = usize> + '_ {
-        let pushes = self.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).map(|step| step.index);
+        let pushes = self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index);
         std::iter::once(0).chain(pushes)
     }
 
@@ -177,12 +177,12 @@ pub struct StepOutcome {
     pub image: Option<Image>,
     /// The image projected into the grid, after a look.
     pub observation: Option<MapObservation>,
-    /// The push with its swept volume, after a push.
-    pub swept: Option<SweptPush>,
-    /// The belief that was predicted for the push, after a push that was predicted.
-    pub prediction: Option<PushPrediction>,
-    /// What the push did.
-    pub push_outcome: Option<PushOutcome>,
-    /// How the arm moved as it was planned: to the view, or to the push, along it and back.
+    /// What the belief update was told, after a manipulation.
+    pub intervention: Option<Intervention>,
+    /// The belief that was predicted, after a manipulation that was predicted.
+    pub prediction: Option<Prediction>,
+    /// What the manipulation did.
+    pub manipulated: Option<ManipulationOutcome>,
+    /// How the arm moved as it was planned: to the view, or to the contact, along it and back.
     pub motion: Option<Motion>,
 }

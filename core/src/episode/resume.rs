@@ -4,7 +4,7 @@ use super::directory::EpisodeDir;
 use super::machine::Episode;
 use super::record::{EpisodeRecord, StepOutcome};
 use super::replay::{Comparison, Difference};
-use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
+use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction};
 use crate::camera::MapObservation;
 use crate::scene::Catalog;
 use crate::{Error, Result};
@@ -87,7 +87,7 @@ impl BeliefUpdate for Absent {
         belief.clone()
     }
 
-    fn predict_pushes(&self, _belief: &Belief, _pushes: &[SweptPush]) -> Vec<PushPrediction> {
+    fn predict(&self, _belief: &Belief, _interventions: &[Intervention]) -> Vec<Prediction> {
         Vec::new()
     }
 }

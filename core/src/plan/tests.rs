@@ -1,11 +1,12 @@
 //! Decisions on a small shelf: 1 cm voxels, a dozen views, a few boxes.
 
 use super::*;
-use crate::belief::{Classical, PushPrediction, SweptPush, evidence};
+use crate::belief::{Classical, FloorPlan, Intervention, Prediction, SOLID, evidence};
 use crate::camera::{Intrinsics, MapObservation, View};
 use crate::gain::{Coverage, GainField, Openings, RayDensity, gain_of_views, gain_together};
 use crate::grid::{Grid, VoxelSet, Window};
 use crate::scene::{CLASS_COUNT, Shelf};
+use crate::skill::push::{Push, SweptPush};
 use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
@@ -83,13 +84,13 @@ impl BeliefUpdate for Prophet {
         belief.clone()
     }
 
-    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+    fn predict(&self, belief: &Belief, pushes: &[Intervention]) -> Vec<Prediction> {
         let grid = &belief.grid;
         let voxel = match self {
             Self::Forgets => [1.0, 1.0],
             Self::Knows => [1.0, 1000.0],
         };
-        let prediction = PushPrediction {
+        let prediction = Prediction {
             window: Window::whole(grid),
             occupancy: vec![voxel; grid.voxel_count()],
             semantics: vec![[1.0; CLASS_COUNT]; grid.cell_count()],
@@ -144,7 +145,7 @@ impl Table {
             belief.occupancy.iter_mut().for_each(|voxel| voxel[1] += sure);
             belief
         };
-        let really_push = |motions: &[PushMotion]| {
+        let really_push = |motions: &[PhasedMotion]| {
             let told = |at: usize| self.really.get(at).copied().unwrap_or_default();
             (0..motions.len()).map(|at| self.truth(told(at))).collect()
         };
@@ -195,7 +196,7 @@ impl Table {
 }
 
 fn is_push(decision: &Decision) -> bool {
-    matches!(decision.action, Action::Push(_))
+    matches!(decision.action, Action::Manipulate(_))
 }
 
 /// Numbers, from 1, of the steps that push.
@@ -247,7 +248,7 @@ fn mem_weighs_no_push_where_none_is_allowed() {
     complete.belief.semantics.iter_mut().for_each(|a| a[14] += 200.0);
     check(&complete, Reason::MapComplete);
     let mut pushed = Table::after_looks(6);
-    pushed.history.actions.push(Action::Push(push()));
+    pushed.history.actions.push(Action::Manipulate(push().into()));
     check(&pushed, Reason::JustPushed);
 }
 
@@ -259,7 +260,7 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
     assert_eq!(decision.reason, Reason::PushTellsMore);
     assert!(is_push(&decision) && decision.igm > decision.igv);
     let best = &decision.candidates[decision.best_push.expect("a best push")];
-    assert_eq!(decision.action, Action::Push(best.push));
+    assert_eq!(decision.action, Action::Manipulate(best.manipulation));
     assert_eq!((best.gain, best.reg), (Some(decision.igm), Some(decision.reg)));
 
     // The winner is scored in full: all views, all rays.
@@ -356,9 +357,9 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
             belief.clone()
         }
 
-        fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+        fn predict(&self, belief: &Belief, pushes: &[Intervention]) -> Vec<Prediction> {
             let cleared = |a: &[f32; 2]| if a[0] > a[1] { [1.0, 100.0] } else { *a };
-            let prediction = PushPrediction {
+            let prediction = Prediction {
                 window: Window::whole(&belief.grid),
                 occupancy: belief.occupancy.iter().map(cleared).collect(),
                 semantics: belief.semantics.clone(),
@@ -375,7 +376,7 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let decision = table.decide(PolicyKind::Mem);
     let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
     assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
-    let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
+    let prediction = Clears.predict(&table.belief, &[swept(&table.belief)]).remove(0);
     let opened =
         Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(std::slice::from_ref(&prediction))[0];
     let sources = push_sources(Counted::Unseen, &field, &table.views, &ids, &prediction, None);
@@ -390,7 +391,7 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     table.settings.patience = 0.9 * decision.igm / decision.igv;
     table.settings.push_floor = 0.0;
     let decision = table.decide(PolicyKind::Mem);
-    assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Push(best.push)));
+    assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Manipulate(best.manipulation)));
 
     // What a push only blurs is worth nothing.
     table.seen =
@@ -432,16 +433,16 @@ fn disturbance_counts_blurred_labels_and_never_rewards() {
     table.settings = PlannerSettings { patience: 1.1 * decision.igm / decision.igv, ..PlannerSettings::default() };
     assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
 
-    let mut sharper = Prophet::Forgets.predict_pushes(&table.belief, &[swept()]).remove(0);
+    let mut sharper = Prophet::Forgets.predict(&table.belief, &[swept(&table.belief)]).remove(0);
     sharper.semantics.iter_mut().for_each(|a| a[14] += 100.0);
     assert_eq!(disturbance(&table.belief, &sharper), 0.0);
 }
 
-fn swept() -> SweptPush {
+fn swept(belief: &Belief) -> Intervention {
     let grid = half_seen().grid;
     let mut swept = VoxelSet::empty(&grid);
     (0..grid.voxel_count()).step_by(97).for_each(|index| swept.insert(index));
-    SweptPush { push: push(), swept }
+    SweptPush { push: push(), swept }.intervention(belief, &FloorPlan::new(belief, SOLID))
 }
 
 #[test]
@@ -564,13 +565,13 @@ fn a_history_takes_down_what_was_done() {
 
     let candidate = CandidateRecord { gain: Some(1.0), view: Some(ViewId(3)), ..CandidateRecord::of(push()) };
     let pushed =
-        Decision { action: Action::Push(push()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
+        Decision { action: Action::Manipulate(push().into()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
     history.record(&pushed, false);
     assert!(history.just_pushed() && history.used_views.is_empty());
     assert_eq!((history.view_of_push, history.best_gains.len()), (Some(ViewId(3)), 1));
     // A push by hand is not the one that was weighed; after a drop there is nothing to look at.
     let by_hand = Push { length_m: 0.07, ..push() };
-    history.record(&Decision { action: Action::Push(by_hand), ..pushed.clone() }, false);
+    history.record(&Decision { action: Action::Manipulate(by_hand.into()), ..pushed.clone() }, false);
     assert_eq!((history.view_of_push, history.dropped), (None, false));
     history.record(&pushed, true);
     assert_eq!((history.view_of_push, history.dropped), (None, true));

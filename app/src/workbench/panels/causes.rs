@@ -77,7 +77,7 @@ impl Subject<'_> {
         }
         let action = match outcome.record.action {
             Action::Look { view } => format!("look from view {}", view.0),
-            Action::Push(_) => "push".to_owned(),
+            Action::Manipulate(_) => "push".to_owned(),
         };
         (!causes.is_empty()).then_some(Change { step: after.step, action, causes, from_to })
     }
@@ -109,7 +109,7 @@ impl Subject<'_> {
     /// What a push did to it.
     fn pushed(&self, outcome: &StepOutcome) -> Vec<String> {
         let mut causes = Vec::new();
-        if let Some(push) = &outcome.swept {
+        if let Some(push) = &outcome.intervention {
             let swept = match self.voxel {
                 Some(voxel) => push.swept.contains(voxel),
                 None => self.grid.column(self.cell).any(|voxel| push.swept.contains(voxel)),
@@ -133,7 +133,7 @@ impl Subject<'_> {
         let update = if self.session.record.config.belief == CNABU { "network" } else { "belief update" };
         match outcome.record.action {
             Action::Look { .. } => format!("{update}, not seen"),
-            Action::Push(_) => format!("{update}, neither swept nor predicted to change"),
+            Action::Manipulate(_) => format!("{update}, neither swept nor predicted to change"),
         }
     }
 

@@ -8,6 +8,7 @@ use crate::workbench::session::{Activity, Moment};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use nudge_core::plan::Action;
+use nudge_core::skill::Manipulation;
 use std::sync::Arc;
 
 mod form;
@@ -109,7 +110,10 @@ fn numbers_that_are_none_and_other_arrays_do_no_harm() {
         decision.gains = vec![f32::NAN, 3.0];
         decision.pair = vec![ViewId(60_000)];
         for candidate in &mut decision.candidates {
-            (candidate.gain, candidate.push.direction_deg) = (Some(f32::NAN), f32::NAN);
+            candidate.gain = Some(f32::NAN);
+            if let Manipulation::Push(push) = &mut candidate.manipulation {
+                push.direction_deg = f32::NAN;
+            }
         }
         decision.best_push = Some(9999);
         model.sessions[0].pending = Some(Arc::new(decision));
@@ -248,7 +252,7 @@ fn a_click_on_a_heading_sorts() {
 fn why_tells_the_causes_of_a_swept_voxel() {
     let mut model = fixture::model();
     let outcome = model.sessions[0].moments[4].outcome.clone().expect("step 4");
-    let swept = &outcome.swept.as_ref().expect("step 4 is a push").swept;
+    let swept = &outcome.intervention.as_ref().expect("step 4 is a push").swept;
     let voxel = swept.iter().nth(swept.len() / 2).expect("sweeps something");
     model.picked = Some(Picked::Voxel(voxel));
     let mut harness = harness(why::show, model);
@@ -376,15 +380,15 @@ fn a_push_that_was_blocked_early_tells_the_length_that_was_planned() {
     let mut model = fixture::model();
     let moment = model.sessions[0].moments[4].clone();
     let mut outcome = (**moment.outcome.as_ref().expect("step 4")).clone();
-    let Action::Push(mut push) = outcome.record.action else { panic!("step 4 is a push") };
+    let Action::Manipulate(Manipulation::Push(mut push)) = outcome.record.action else { panic!("step 4 is a push") };
     push.length_m = 0.14;
-    outcome.record.action = Action::Push(push);
+    outcome.record.action = Action::Manipulate(push.into());
     // What it swept ends where the arm was blocked.
-    outcome.swept.as_mut().expect("swept").push.length_m = 0.05;
+    outcome.intervention.as_mut().expect("told").stroke.length_m = 0.05;
     let report = outcome.record.push.as_mut().expect("a report");
     (report.pushed_m, report.stalled) = (0.05, true);
-    let pushed = outcome.push_outcome.as_mut().expect("an outcome");
-    (pushed.pushed_m, pushed.stalled) = (0.05, true);
+    let pushed = outcome.manipulated.as_mut().expect("an outcome");
+    (pushed.way_m, pushed.stalled) = (0.05, true);
     model.sessions[0].moments[4] = Arc::new(Moment { outcome: Some(Arc::new(outcome)), ..(*moment).clone() });
     model.cursor = 4;
     let harness = harness(push::show, model);

@@ -5,6 +5,7 @@ use super::words;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::plan::{Action, CandidateRecord, Counted, Decision};
+use nudge_core::skill::{Parameter, SkillKind, Unit};
 use std::collections::BTreeSet;
 
 /// How many views and pushes the tables list.
@@ -18,7 +19,7 @@ pub fn used_views(record: &EpisodeRecord, step: usize) -> BTreeSet<ViewId> {
             Action::Look { view } => {
                 used.insert(view);
             }
-            Action::Push(_) => used.clear(),
+            Action::Manipulate(_) => used.clear(),
         }
     }
     used
@@ -47,7 +48,7 @@ pub fn best_gain(decision: &Decision) -> f32 {
 pub fn looked_from(decision: &Decision) -> Option<ViewId> {
     match decision.action {
         Action::Look { view } => Some(view),
-        Action::Push(_) => None,
+        Action::Manipulate(_) => None,
     }
 }
 
@@ -55,7 +56,7 @@ pub fn looked_from(decision: &Decision) -> Option<ViewId> {
 pub fn pushed(decision: &Decision) -> Option<usize> {
     match decision.action {
         Action::Look { .. } => None,
-        Action::Push(push) => decision.candidates.iter().position(|candidate| candidate.push == push),
+        Action::Manipulate(done) => decision.candidates.iter().position(|candidate| candidate.manipulation == done),
     }
 }
 
@@ -145,17 +146,38 @@ pub fn view_rows(
     order.into_iter().take(LISTED).map(row).collect()
 }
 
+/// The numbers of the candidates that have a column: title and meaning, in the order in which skills tell them.
+fn numbers(decision: &Decision) -> Vec<(&'static str, &'static str)> {
+    let mut columns: Vec<(&str, &str)> = Vec::new();
+    let mut kinds: Vec<SkillKind> = Vec::new();
+    for candidate in &decision.candidates {
+        // Candidates of one skill have the same numbers.
+        if kinds.contains(&candidate.manipulation.kind()) {
+            continue;
+        }
+        kinds.push(candidate.manipulation.kind());
+        for parameter in candidate.manipulation.describe().parameters {
+            let Some(title) = parameter.column else { continue };
+            if !columns.iter().any(|(known, _)| *known == title) {
+                columns.push((title, parameter.hint));
+            }
+        }
+    }
+    columns
+}
+
 /// Columns of [`push_rows`].
-pub fn push_columns(counted: Counted) -> [Column; 7] {
-    [
+pub fn push_columns(decision: &Decision, counted: Counted) -> Vec<Column> {
+    let mut columns = vec![
         Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
         Column { title: "Value", hint: "Gain + γ·Reg, nats: what is compared with looking", width: 50.0 },
         Column { title: "Gain", hint: push_gain(counted), width: 50.0 },
         Column { title: "γ·Reg", hint: DISTURBANCE, width: 42.0 },
-        Column { title: "To", hint: "Direction, degrees; 90 is into the shelf, 0 to the right", width: 34.0 },
-        Column { title: "mm", hint: "Planned length of the push, millimetres", width: 30.0 },
-        Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 },
-    ]
+    ];
+    let width = |title: &str| if title == "mm" { 30.0 } else { 34.0 };
+    columns.extend(numbers(decision).into_iter().map(|(title, hint)| Column { title, hint, width: width(title) }));
+    columns.push(Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 });
+    columns
 }
 
 /// What `γ·Reg` is.
@@ -181,33 +203,47 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
         order.retain(|at| candidates[*at].rejection.is_none());
         order.truncate(LISTED);
     }
+    let columns = numbers(decision);
+    let several = candidates.iter().any(|candidate| candidate.manipulation.kind() != candidates[0].manipulation.kind());
     let row = |at: usize| {
         let candidate = &candidates[at];
-        let push = &candidate.push;
+        let told = candidate.manipulation.describe();
+        let skill = words::capital(candidate.manipulation.kind().name());
         let (note, hint) = match &candidate.rejection {
             _ if pushed == Some(at) => ("chosen".to_owned(), String::new()),
             _ if decision.best_push == Some(at) => ("best".to_owned(), String::new()),
-            Some(rejection) => ("rejected".to_owned(), words::capital(&rejection.to_string())),
+            Some(rejection) => ("rejected".to_owned(), words::capital(&candidate.manipulation.against(rejection))),
             None => (String::new(), String::new()),
         };
-        let place = format!("From x {}, y {} m", words::metres(push.start[0]), words::metres(push.start[1]));
+        let place = told.facts.first().map_or_else(String::new, |fact| {
+            words::capital(&format!("{} {}", fact.name, fact.text.replace('-', "−")))
+        });
         let view = candidate.view.map_or_else(String::new, |view| format!("; best seen from view {}", view.0));
         let name = match (&candidate.rejection, value(candidate, gamma)) {
-            (Some(rejection), _) => format!("Push {at}, rejected: {}", rejection),
-            (None, Some(value)) => format!("Push {at}, value {}", words::nats(value)),
-            (None, None) => format!("Push {at}, not weighed"),
+            (Some(rejection), _) => {
+                format!("{skill} {at}, rejected: {}", candidate.manipulation.against(rejection))
+            }
+            (None, Some(value)) => format!("{skill} {at}, value {}", words::nats(value)),
+            (None, None) => format!("{skill} {at}, not weighed"),
         };
+        let mut cells = vec![
+            Cell::number(at),
+            Cell::nats(value(candidate, gamma)),
+            Cell::nats(candidate.gain),
+            Cell::nats(candidate.reg.map(|reg| gamma * reg)),
+        ];
+        cells.extend(columns.iter().map(|(title, _)| {
+            match told.parameters.iter().find(|parameter| parameter.column == Some(title)) {
+                Some(parameter) => Cell::Figure(f64::from(parameter.value), figure(parameter)),
+                None => Cell::Word(String::new()),
+            }
+        }));
+        // Where there are several skills, the note says which one it is.
+        let note = if several { format!("{} {note}", candidate.manipulation.kind().name()) } else { note };
+        cells.push(Cell::Word(note.trim_end().to_owned()));
         Row {
             key: at,
-            cells: vec![
-                Cell::number(at),
-                Cell::nats(value(candidate, gamma)),
-                Cell::nats(candidate.gain),
-                Cell::nats(candidate.reg.map(|reg| gamma * reg)),
-                Cell::Figure(f64::from(push.direction_deg), format!("{:.0}°", push.direction_deg).replace('-', "−")),
-                Cell::Figure(f64::from(push.length_m), format!("{:.0}", push.length_m * 1e3)),
-                Cell::Word(note),
-            ],
+            cells,
             chosen: pushed == Some(at),
             selected: selected == Some(at),
             grey: candidate.rejection.is_some(),
@@ -216,6 +252,12 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
         }
     };
     order.into_iter().map(row).collect()
+}
+
+/// A number as it stands in a table: degrees have their sign, lengths none.
+fn figure(parameter: &Parameter) -> String {
+    let sign = if parameter.unit == Unit::Degrees { parameter.sign() } else { "" };
+    (parameter.number() + sign).replace('-', "−")
 }
 
 #[cfg(test)]
@@ -228,7 +270,8 @@ mod tests {
         assert!(gain(Counted::All).contains("Σ rays Σ voxels"), "{}", gain(Counted::All));
         let coverage = gain(Counted::Unseen);
         assert!(coverage.contains("max over rays") && !coverage.contains("Σ rays"), "{coverage}");
-        let push = |counted| push_columns(counted)[2].hint;
+        let decision = crate::fixture::play(1).record.steps[0].decision.clone();
+        let push = |counted| push_columns(&decision, counted)[2].hint;
         assert!(push(Counted::All).contains("best single view"), "{}", push(Counted::All));
         assert!(push(Counted::Unseen).contains("opens") && !push(Counted::Unseen).contains("best single view"));
     }

@@ -105,7 +105,7 @@ fn prepare(model: &mut Model, name: &str, cursor: usize) {
     model.cursor = cursor;
     model.kept.layout = if name == "compare" { LayoutKind::Compare } else { LayoutKind::Episode };
     let session = &model.sessions[0];
-    let swept = session.moments[6].outcome.as_ref().and_then(|outcome| outcome.swept.as_ref());
+    let swept = session.moments[6].outcome.as_ref().and_then(|outcome| outcome.intervention.as_ref());
     let middle = swept.and_then(|swept| swept.swept.iter().nth(swept.swept.len() * 3 / 4));
     let height = session.moments[0].belief.grid().dims[2];
     model.picked = match (name, middle) {

@@ -1,7 +1,7 @@
 //! The frontier: the first surely occupied voxels seen from the shelf's entrance; and pushes from it into the shelf.
 
 use super::{CONFIDENT, LENGTH_M, LIKELY, REACH_M, STANDOFF_M, TOOL_HEIGHT_M};
-use crate::arm::Push;
+use crate::skill::Push;
 use crate::belief::Belief;
 use crate::grid::Voxel;
 use crate::rng::ChaCha8Rng;

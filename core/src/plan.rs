@@ -43,7 +43,7 @@ pub enum Action {
 impl<'de> Deserialize<'de> for Action {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
         use serde::de::Error as _;
-        let fields = serde_json::Map::deserialize(deserializer)?;
+        let fields = serde_json::Map::<String, serde_json::Value>::deserialize(deserializer)?;
         match fields.get("kind").and_then(serde_json::Value::as_str) {
             None => Err(D::Error::missing_field("kind")),
             Some("look") => {

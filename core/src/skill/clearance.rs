@@ -145,7 +145,7 @@ impl<'a> ArmClearance<'a> {
                 reason.deeper(1, blocked(Stage::Start, hit));
                 continue;
             }
-            if let Some(hit) = self.gripper_hit(pose, travel, Some(target)).1 {
+            if let Some(hit) = self.gripper_hit(pose, travel, Some(*target)).1 {
                 reason.deeper(2, blocked(Stage::Contact, hit));
                 continue;
             }
@@ -181,7 +181,7 @@ impl<'a> ArmClearance<'a> {
                     continue;
                 };
                 let (mut back, hit) = self.follow(&pushing, top, &Vector3::new(0.0, -out * free, 0.0));
-                back.path.splice(0..1, up.path);
+                drop(back.path.splice(0..1, up.path));
                 let ended = back.path.last().map_or(tip.y, |last| arm.world_from_tool(last).translation.y);
                 let is_out = tip.y - ended >= least - 1e-6;
                 let hit = hit.or_else(|| out_hit.clone());

@@ -23,12 +23,21 @@ use serde::{Deserialize, Serialize};
 const DIRECTIONS_DEG: [f32; 2] = [-120.0, -60.0];
 /// How far down the gripper points, degrees.
 const PITCHES_DEG: [f32; 2] = [25.0, 65.0];
-/// Lowest and highest place of the tip above the board, metres.
-const HEIGHT_M: [f32; 2] = [0.03, 0.08];
+/// Lowest place of the tip above the board, and how far below the object's top it is at least and at most, metres.
+const LOWEST_M: f32 = 0.03;
+const BELOW_TOP_M: [f32; 2] = [0.015, 0.06];
+/// Half of the finger's thickness, metres. Where a gripper is thicker, the check of the arm rejects what is too near.
+const FINGER_HALF_M: f32 = 0.0175;
+/// How far above the object the finger is at the start, metres.
+const GAP_M: f32 = 0.01;
 /// Occupancy probability up to which the space behind an object counts as free.
 const FREE: f32 = 0.4;
 /// How far behind the contact there must be free space, and how far to either side of it: the finger, metres.
 const ROOM_M: [f32; 2] = [0.045, 0.015];
+/// How far beyond its way the object may begin that the finger, reaching over it, pulls, metres.
+const OVER_M: f32 = 0.10;
+/// Inclinations and heights that are tried for one that has room.
+const TRIES: usize = 8;
 /// How far the gripper is drawn back along its own axis before it leaves the shelf, metres; each is tried.
 const LIFTS_M: [f64; 2] = [0.16, 0.08];
 /// Length of the line that shows how the gripper stands, metres.
@@ -53,10 +62,11 @@ impl Drag {
         Stroke { start: self.start.into(), direction: Vector::new(cos, sin, 0.0), length_m: self.length_m }
     }
 
-    /// The object that it pulls: what stands on the first floor cell along its way.
+    /// The object that it pulls: what stands on the first floor cell along its way, which the finger may reach over before
+    /// the tip is there.
     fn target(&self, plan: &FloorPlan, grid: &Grid) -> Option<(usize, Patch)> {
         let (stroke, step) = (self.stroke(), 0.5 * grid.voxel_m);
-        let steps = (self.length_m / step).ceil() as usize;
+        let steps = ((self.length_m + OVER_M) / step).ceil() as usize;
         let track = (0..=steps).filter_map(|i| grid.cell_at(stroke.start + stroke.direction * (step * i as f32)));
         let met = track.map(|cell| grid.cell_index(cell)).find(|cell| plan.stands(*cell))?;
         Some((met, plan.patch(met, OBJECT_RADIUS_M)))
@@ -83,43 +93,93 @@ impl Drag {
     }
 }
 
-/// The floor cells at the back of what stands, behind which the belief has room for the tip.
-fn backs(belief: &Belief, plan: &FloorPlan) -> Vec<usize> {
-    let grid = &belief.grid;
-    let [width, depth, height] = grid.dims;
-    let cells = |m: f32| (m / grid.voxel_m).ceil() as usize;
-    let [behind, beside] = ROOM_M.map(cells);
-    let level = |m: f32| (((m - grid.origin[2]) / grid.voxel_m) as usize).min(height - 1);
-    let levels = level(HEIGHT_M[0])..level(HEIGHT_M[1]) + 1;
-    let free = |x: usize, y: usize| {
-        let column = grid.column(x * depth + y);
-        levels.clone().all(|z| belief.probability(column.start + z) <= FREE)
-    };
-    let has_room = |cell: &usize| {
-        let (x, y) = (cell / depth, cell % depth);
-        let inside = x >= beside && x + beside < width && y + behind < depth;
-        let mut room = (x.saturating_sub(beside)..=x + beside).flat_map(|x| (y + 1..=y + behind).map(move |y| (x, y)));
-        inside && room.all(|(x, y)| free(x, y))
-    };
-    (0..grid.cell_count()).filter(|cell| plan.stands(*cell)).filter(has_room).collect()
+/// How far the finger reaches over an object of that height when its tip is at a height, metres: the lower side of the
+/// inclined finger is there as high as the object.
+fn overhang_m(top_m: f32, tip_m: f32, pitch_deg: f32) -> f32 {
+    let pitch = pitch_deg.to_radians();
+    ((top_m - tip_m + FINGER_HALF_M / pitch.cos()) / pitch.tan()).max(0.0)
+}
+
+/// What is believed to stand, for looking for what can be reached from behind.
+struct Backs<'a> {
+    belief: &'a Belief,
+    plan: &'a FloorPlan,
+}
+
+impl Backs<'_> {
+    fn cells(&self, m: f32) -> usize {
+        (m / self.belief.grid.voxel_m).ceil() as usize
+    }
+
+    /// How high what stands on a floor cell and beside it is, metres above the board.
+    fn top_m(&self, cell: usize) -> f32 {
+        let grid = &self.belief.grid;
+        let [width, depth, _] = grid.dims;
+        let (x, y, beside) = (cell / depth, cell % depth, self.cells(ROOM_M[1]));
+        let near = (x.saturating_sub(beside)..(x + beside + 1).min(width))
+            .flat_map(|x| (y.saturating_sub(beside)..=y).map(move |y| x * depth + y));
+        let levels = near.filter_map(|cell| grid.column(cell).rposition(|voxel| self.belief.probability(voxel) > AVOIDED));
+        levels.max().map_or(0.0, |level| (level + 1) as f32 * grid.voxel_m)
+    }
+
+    /// Whether the space behind a floor cell is believed free, so far back, and from some height up to another.
+    fn has_room(&self, cell: usize, back_m: f32, [low_m, high_m]: [f32; 2]) -> bool {
+        let grid = &self.belief.grid;
+        let [width, depth, height] = grid.dims;
+        let level = |m: f32| ((m.max(0.0) / grid.voxel_m) as usize).min(height - 1);
+        let (x, y, back, beside) = (cell / depth, cell % depth, self.cells(back_m), self.cells(ROOM_M[1]));
+        if x < beside || x + beside >= width || y + back >= depth {
+            return false;
+        }
+        let free = |x: usize, y: usize| {
+            let first = grid.column(x * depth + y).start;
+            (level(low_m)..=level(high_m)).all(|z| self.belief.probability(first + z) <= FREE)
+        };
+        (x - beside..=x + beside).all(|x| (y + 1..=y + back).all(|y| free(x, y)))
+    }
+
+    /// The floor cells at the back of what stands, behind which the belief has room.
+    fn all(&self) -> Vec<usize> {
+        let cells = 0..self.belief.grid.cell_count();
+        let low = [LOWEST_M, LOWEST_M + 2.0 * FINGER_HALF_M];
+        cells.filter(|cell| self.plan.stands(*cell) && self.has_room(*cell, ROOM_M[0], low)).collect()
+    }
+
+    /// A drag of what stands on a floor cell: of some inclinations and heights the first one that has room, else the last.
+    fn draw(&self, cell: usize, rng: &mut ChaCha8Rng) -> (Voxel, Drag) {
+        let (grid, top_m) = (&self.belief.grid, self.top_m(cell));
+        let Cell { x, y } = grid.cell(cell);
+        let at = grid.cell_center(Cell { x, y });
+        let mut between = |[low, high]: [f32; 2]| rng.random_range(low..high);
+        let (direction_deg, length_m) = (between(DIRECTIONS_DEG), between(LENGTH_M));
+        let (sin, cos) = direction_deg.to_radians().sin_cos();
+        let tries = (0..TRIES).map(|_| {
+            let (pitch_deg, below_m) = (between(PITCHES_DEG), between(BELOW_TOP_M));
+            let tip_m = (top_m - below_m).max(LOWEST_M);
+            let standoff_m = overhang_m(top_m + GAP_M, tip_m, pitch_deg).max(STANDOFF_M);
+            (pitch_deg, tip_m, standoff_m)
+        });
+        let tries: Vec<(f32, f32, f32)> = tries.collect();
+        let room = |(_, tip_m, standoff_m): &&(f32, f32, f32)| {
+            self.has_room(cell, standoff_m + FINGER_HALF_M, [tip_m - FINGER_HALF_M, tip_m + FINGER_HALF_M])
+        };
+        let found = tries.iter().find(room).or(tries.last()).copied();
+        let (pitch_deg, tip_m, standoff_m) = found.unwrap_or((PITCHES_DEG[1], LOWEST_M, STANDOFF_M));
+        let start = [at.x - cos * standoff_m, at.y - sin * standoff_m, grid.origin[2] + tip_m];
+        (Voxel { x, y, z: (tip_m / grid.voxel_m) as u16 }, Drag { start, direction_deg, length_m, pitch_deg })
+    }
 }
 
 impl Skill for Drag {
     fn sample(ground: &Ground<'_>, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
         let (belief, arm, grid) = (ground.belief, ground.arm, &ground.belief.grid);
         let (clearance, plan) = (ArmClearance::new(arm, belief), FloorPlan::new(belief, AVOIDED));
-        let mut backs = backs(belief, &plan);
-        let draws = backs.len().min(count * DRAWS_PER_CANDIDATE);
+        let backs = Backs { belief, plan: &plan };
+        let mut left = backs.all();
+        let draws = left.len().min(count * DRAWS_PER_CANDIDATE);
         let draw = |rng: &mut ChaCha8Rng| {
-            let Cell { x, y } = grid.cell(backs.swap_remove(rng.random_range(0..backs.len())));
-            let mut between = |[low, high]: [f32; 2]| rng.random_range(low..high);
-            let (direction_deg, length_m) = (between(DIRECTIONS_DEG), between(LENGTH_M));
-            let (pitch_deg, height_m) = (between(PITCHES_DEG), between(HEIGHT_M));
-            let at = grid.cell_center(Cell { x, y });
-            let (sin, cos) = direction_deg.to_radians().sin_cos();
-            let start = [at.x - cos * STANDOFF_M, at.y - sin * STANDOFF_M, grid.origin[2] + height_m];
-            let z = (height_m / grid.voxel_m) as u16;
-            (Voxel { x, y, z }, Self { start, direction_deg, length_m, pitch_deg })
+            let cell = left.swap_remove(rng.random_range(0..left.len()));
+            backs.draw(cell, rng)
         };
         draw_until(count, draws, rng, draw, |(contact, drag), rng| {
             let motion = match drag.target(&plan, grid) {
@@ -160,7 +220,9 @@ impl Skill for Drag {
         let Some((first, target)) = self.target(solid, grid) else {
             return Intervention { swept, flow: Flow::nothing(), stroke };
         };
-        let before = stroke.along(grid.cell_center(grid.cell(first)));
+        let backs = Backs { belief, plan: solid };
+        let over_m = overhang_m(backs.top_m(first), self.start[2] - grid.origin[2], self.pitch_deg);
+        let before = (stroke.along(grid.cell_center(grid.cell(first))) - over_m).max(0.0);
         let way_m = (stroke.length_m - before + 0.5 * grid.voxel_m).max(0.0);
         let flow = Flow::rigid(grid, &target, [0, 1].map(|axis| stroke.direction[axis] * way_m));
         let (moved, met) = (flow.moved(grid), Met::of(belief, &swept));

@@ -32,7 +32,6 @@ use crate::named;
 use crate::rng::ChaCha8Rng;
 use frontier::{Frontier, start_of};
 use hidden::Contacts;
-use rand::Rng;
 use serde::{Deserialize, Serialize};
 
 /// How far before the frontier point the tip starts, metres.

@@ -116,7 +116,7 @@ impl<'de> Deserialize<'de> for Manipulation {
     /// Without a `kind` it is of the first skill: candidates of before there were others do not tell.
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         use serde::de::Error as _;
-        let mut fields = serde_json::Map::deserialize(deserializer)?;
+        let mut fields = serde_json::Map::<String, serde_json::Value>::deserialize(deserializer)?;
         let kind = match fields.remove("kind") {
             None => SkillKind::default(),
             Some(serde_json::Value::String(name)) => SkillKind::named(&name).map_err(D::Error::custom)?,

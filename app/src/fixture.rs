@@ -5,10 +5,10 @@ use nudge_core::belief::{Belief, BeliefUpdate, Classical, FloorPlan, SOLID};
 use nudge_core::camera::{self, ViewArray, ViewId};
 use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
-use nudge_core::skill::push::{PushSampler, sample};
 use nudge_core::rng;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::score::{Scores, object_verdicts};
+use nudge_core::skill::push::{PushSampler, sample};
 use nudge_core::world::{TruthMap, World};
 
 /// An episode with everything that it went through.

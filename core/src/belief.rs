@@ -12,9 +12,9 @@ mod sightings;
 
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
+pub(crate) use intervention::Met;
 #[cfg(feature = "cnabu")]
 pub(crate) use intervention::Moved;
-pub(crate) use intervention::Met;
 pub use intervention::{Flow, Intervention, SOLID, Stroke};
 pub use networks::{NetworksUsed, Weights, short};
 pub use sightings::{CHANGED, LOOKS_TAKEN, NEWS_REACH_M, Sightings, look};

@@ -191,8 +191,7 @@ fn motions(episode: &Episode, logged: &StepRecord) -> Vec<(usize, PhasedMotion)>
     let clearance = ArmClearance::new(tool, episode.belief());
     let of = |(at, candidate): (usize, &CandidateRecord)| {
         let skill = candidate.manipulation.skill();
-        let kept =
-            |motion: &&PhasedMotion| tool.ready.is_some_and(|ready| skill.is_done_by(motion, &tool.arm, &ready));
+        let kept = |motion: &&PhasedMotion| tool.ready.is_some_and(|ready| skill.is_done_by(motion, &tool.arm, &ready));
         let again = || {
             let drawn = drawn.get(at).filter(|drawn| drawn.manipulation == candidate.manipulation);
             drawn.and_then(|drawn| drawn.motion.clone())

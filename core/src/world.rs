@@ -1,8 +1,8 @@
 //! The simulated scene (rapier3d): bodies settle, a motion is carried out by the arm as kinematic bodies, drops are
 //! detected. Deterministic: the same scene and the same motions give the same poses, bit for bit, on one machine.
 
-mod manipulate;
 mod hull;
+mod manipulate;
 mod physics;
 mod truth;
 

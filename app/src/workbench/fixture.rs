@@ -9,8 +9,8 @@ use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
 use nudge_core::gain::RayDensity;
 use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, gain_field, gain_sources};
-use nudge_core::skill::intended;
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
+use nudge_core::skill::intended;
 use nudge_core::world::TruthMap;
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
@@ -168,12 +168,7 @@ pub fn answer(model: &mut Model) {
         let told = [intended(&session.setup.arm, &belief, &manipulation)];
         let prediction = session.setup.update.as_ref().expect("an update").predict(&belief, &told).remove(0);
         let [told] = told;
-        Preview {
-            of: (session.id, step),
-            manipulation,
-            prediction: Arc::new(prediction),
-            swept: Arc::new(told.swept),
-        }
+        Preview { of: (session.id, step), manipulation, prediction: Arc::new(prediction), swept: Arc::new(told.swept) }
     });
     let source = model.view.map(|view| {
         let nats = gain_sources(

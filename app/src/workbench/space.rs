@@ -16,13 +16,13 @@ use crate::colors::{self, Colormap, Rgb};
 use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::colored;
-use nudge_core::{Point, Pose};
 use nudge_core::belief::Belief;
 use nudge_core::camera::ViewId;
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{Body, Catalog, Shelf};
 use nudge_core::solid::ConvexPart;
+use nudge_core::{Point, Pose};
 use rerun::{AsComponents, RecordingStream};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -396,8 +396,7 @@ impl Painter {
                 Hovered::Manipulation(manipulation) => {
                     let outline = manipulation.outline();
                     let ways = outline.arrows.iter().map(|arrow| vec![arrow.start, arrow.end()]);
-                    let strip =
-                        |line: Vec<Point>| line.iter().map(|p| <[f32; 3]>::from(p.coords)).collect::<Vec<_>>();
+                    let strip = |line: Vec<Point>| line.iter().map(|p| <[f32; 3]>::from(p.coords)).collect::<Vec<_>>();
                     rerun::LineStrips3D::new(ways.chain(outline.lines.iter().cloned()).map(strip))
                         .with_colors([rerun::Color::from([255, 255, 255])])
                         .with_radii([0.006_f32])

@@ -40,7 +40,17 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -
         LayoutKind::Episode | LayoutKind::Why => view(
             "Belief",
             &[
-                &[at::BELIEF, at::OBJECTS, at::VIEWS, at::CURRENT, at::CANDIDATES, at::CHOSEN, at::LINES, at::ARM, at::ARM_PATH],
+                &[
+                    at::BELIEF,
+                    at::OBJECTS,
+                    at::VIEWS,
+                    at::CURRENT,
+                    at::CANDIDATES,
+                    at::CHOSEN,
+                    at::LINES,
+                    at::ARM,
+                    at::ARM_PATH,
+                ],
                 &pointer[..],
             ]
             .concat(),
@@ -58,7 +68,15 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -
                         view(
                             "Now",
                             &[
-                                &[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN, at::LINES, at::ARM, at::ARM_PATH],
+                                &[
+                                    at::BELIEF,
+                                    at::OBJECTS,
+                                    at::CANDIDATES,
+                                    at::CHOSEN,
+                                    at::LINES,
+                                    at::ARM,
+                                    at::ARM_PATH,
+                                ],
                                 &pointer[..],
                             ]
                             .concat(),

@@ -97,7 +97,11 @@ impl Flow {
             low = std::array::from_fn(|axis| low[axis].min(at[axis]));
             high = std::array::from_fn(|axis| high[axis].max(at[axis] + 1));
         }
-        let after = if ways.is_empty() { Self::nothing().window } else { Window { x: [low[0], high[0]], y: [low[1], high[1]] } };
+        let after = if ways.is_empty() {
+            Self::nothing().window
+        } else {
+            Window { x: [low[0], high[0]], y: [low[1], high[1]] }
+        };
         let mut moved = Moved {
             depth,
             before: self.window,

@@ -184,14 +184,7 @@ impl Layout {
 
     /// Channels of the (mirrored) whole `planes`, shifted with what is moved to where it comes to in the pixels `x`
     /// (zero before).
-    pub(crate) fn put_arriving(
-        &self,
-        moved: &Moved,
-        planes: &[f32],
-        mirror: Mirror,
-        x: Range<usize>,
-        out: &mut [f32],
-    ) {
+    pub(crate) fn put_arriving(&self, moved: &Moved, planes: &[f32], mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
         let (whole, plane) = (self.plane(), x.len() * self.pixels[1]);
         for (cell, sub, pixel) in self.cells(mirror, x) {
             let Some(source) = moved.source(cell) else { continue };

@@ -95,8 +95,11 @@ pub(super) fn predict(
         let windowed: Vec<_> = batch
             .iter()
             .zip(&moved)
-            .map(|(Intervention { swept, stroke, .. }, moved)| {
-                Windowed { swept, stroke, moved, x: layout.around(stroke, WINDOW) }
+            .map(|(Intervention { swept, stroke, .. }, moved)| Windowed {
+                swept,
+                stroke,
+                moved,
+                x: layout.around(stroke, WINDOW),
             })
             .collect();
         let xs: Vec<Range<usize>> = windowed.iter().map(|push| push.x.clone()).collect();

@@ -195,7 +195,10 @@ impl Episode {
     ) -> Result<StepOutcome> {
         let name = manipulation.kind().name();
         if self.history.dropped {
-            return Err(Error::Usage(format!("an object was dropped: this episode {} no more", manipulation.kind().plural())));
+            return Err(Error::Usage(format!(
+                "an object was dropped: this episode {} no more",
+                manipulation.kind().plural()
+            )));
         }
         if !manipulation.skill().is_finite() {
             return Err(Error::Usage(format!("a {name} must be a finite motion, not {manipulation:?}")));

@@ -158,7 +158,8 @@ impl EpisodeRecord {
 
     /// The numbers of actions after which there is a truth: 0 and every push.
     pub fn truth_indices(&self) -> impl Iterator<Item = usize> + '_ {
-        let pushes = self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index);
+        let pushes =
+            self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index);
         std::iter::once(0).chain(pushes)
     }
 

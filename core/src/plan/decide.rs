@@ -6,8 +6,8 @@ use super::{Action, Counted, Decision, PlannerSettings, PolicyKind, Reason, Situ
 use crate::belief::Belief;
 use crate::camera::ViewId;
 use crate::gain::{RayDensity, gain_together};
-use crate::skill::PushTruth;
 use crate::rng::stream;
+use crate::skill::PushTruth;
 use rand::Rng;
 use rayon::prelude::*;
 
@@ -87,7 +87,7 @@ fn choose(decision: &mut Decision, weighed: Weighed, settings: &PlannerSettings)
     decision.reg = best.reg.unwrap_or(0.0);
     decision.reason = ruled(decision, settings);
     if decision.reason == Reason::PushTellsMore {
-        decision.action = Action::Manipulate(best.push);
+        decision.action = Action::Manipulate(best.manipulation);
     }
 }
 

@@ -46,9 +46,9 @@ pub fn saturated(previous: f32, current: f32, share: f32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::skill::{Manipulation, Push};
     use crate::camera::ViewId;
     use crate::plan::{Action, Counted};
+    use crate::skill::{Manipulation, Push};
 
     const LOOK: Action = Action::Look { view: ViewId(0) };
     const PUSH: Action =

@@ -564,8 +564,12 @@ fn a_history_takes_down_what_was_done() {
     assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
 
     let candidate = CandidateRecord { gain: Some(1.0), view: Some(ViewId(3)), ..CandidateRecord::of(push()) };
-    let pushed =
-        Decision { action: Action::Manipulate(push().into()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
+    let pushed = Decision {
+        action: Action::Manipulate(push().into()),
+        candidates: vec![candidate],
+        best_push: Some(0),
+        ..look.clone()
+    };
     history.record(&pushed, false);
     assert!(history.just_pushed() && history.used_views.is_empty());
     assert_eq!((history.view_of_push, history.best_gains.len()), (Some(ViewId(3)), 1));

@@ -7,8 +7,8 @@
 
 use super::{CONFIDENT, Rejection, Stage};
 use crate::arm::{
-    Arm, ArmTool, DistanceField, Follow, Frame, Hit, Joints, Obstacle, PhasedMotion, PlanSettings,
-    Space, YAWS_DEG, follow_line, inclined_tool, plan, turned,
+    Arm, ArmTool, DistanceField, Follow, Frame, Hit, Joints, Obstacle, PhasedMotion, PlanSettings, Space, YAWS_DEG,
+    follow_line, inclined_tool, plan, turned,
 };
 use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch, beta_mean};
 use crate::grid::{Cell, Grid, Voxel, VoxelSet};

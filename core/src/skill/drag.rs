@@ -118,7 +118,8 @@ impl Backs<'_> {
         let (x, y, beside) = (cell / depth, cell % depth, self.cells(ROOM_M[1]));
         let near = (x.saturating_sub(beside)..(x + beside + 1).min(width))
             .flat_map(|x| (y.saturating_sub(beside)..=y).map(move |y| x * depth + y));
-        let levels = near.filter_map(|cell| grid.column(cell).rposition(|voxel| self.belief.probability(voxel) > AVOIDED));
+        let levels =
+            near.filter_map(|cell| grid.column(cell).rposition(|voxel| self.belief.probability(voxel) > AVOIDED));
         levels.max().map_or(0.0, |level| (level + 1) as f32 * grid.voxel_m)
     }
 

@@ -22,8 +22,8 @@ use super::carried::carried_along;
 use super::clearance::{Approach, gripper_poses};
 use super::sampling::draw_until;
 use super::{
-    ArmClearance, CONFIDENT, Candidate, DRAWS_PER_CANDIDATE, Description, Ground, LIKELY, Manipulation, Outline, Rejection,
-    Skill, SkillKind,
+    ArmClearance, CONFIDENT, Candidate, DRAWS_PER_CANDIDATE, Description, Ground, LIKELY, Manipulation, Outline,
+    Rejection, Skill, SkillKind,
 };
 use crate::arm::{Arm, ArmTool, Joints, PhasedMotion, level_tool};
 use crate::belief::{Belief, FloorPlan, Intervention, Patch};
@@ -91,7 +91,11 @@ impl Skill for Push {
     }
 
     fn plan(&self, clearance: &ArmClearance<'_>, rng: &mut ChaCha8Rng) -> Result<PhasedMotion, Rejection> {
-        self.motion(clearance, &clearance.target_of(self.start_point(), self.direction(), self.length_m, STANDOFF_M), rng)
+        self.motion(
+            clearance,
+            &clearance.target_of(self.start_point(), self.direction(), self.length_m, STANDOFF_M),
+            rng,
+        )
     }
 
     fn is_done_by(&self, motion: &PhasedMotion, arm: &Arm, ready: &Joints) -> bool {
@@ -209,9 +213,13 @@ pub fn sample(
     let clearance = ArmClearance::new(arm, belief);
     let mut source = Source::new(sampler, belief, seen);
     let draws = source.draws(count);
-    draw_until(count, draws, rng, |rng| source.draw(rng), |(point, push), rng| {
-        candidate(belief, &clearance, rng, point, push)
-    })
+    draw_until(
+        count,
+        draws,
+        rng,
+        |rng| source.draw(rng),
+        |(point, push), rng| candidate(belief, &clearance, rng, point, push),
+    )
 }
 
 /// Checks a drawn push. One without a target is kept as the straight push that it would have been.

@@ -235,7 +235,8 @@ mod tests {
                     folders.push(path);
                     continue;
                 }
-                let is_code = path.extension().is_some_and(|end| end == "rs") && !path.to_string_lossy().contains("tests");
+                let is_code =
+                    path.extension().is_some_and(|end| end == "rs") && !path.to_string_lossy().contains("tests");
                 let text = if is_code { std::fs::read_to_string(&path).expect("a source file") } else { String::new() };
                 let code = text.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
                 // `DragValue(` is not `Drag(`.
@@ -267,7 +268,12 @@ mod tests {
         assert_eq!(SkillSet::default().to_string(), "push");
         assert!("".parse::<SkillSet>().is_err() && "push,".parse::<SkillSet>().is_err());
         let text = serde_json::to_string(&both).expect("JSON");
-        assert_eq!((text.as_str(), serde_json::from_str::<SkillSet>(&text).expect("a set")), (r#"["push","drag"]"#, both));
-        assert!(serde_json::from_str::<SkillSet>("[]").is_err() && serde_json::from_str::<SkillSet>(r#"["fly"]"#).is_err());
+        assert_eq!(
+            (text.as_str(), serde_json::from_str::<SkillSet>(&text).expect("a set")),
+            (r#"["push","drag"]"#, both)
+        );
+        assert!(
+            serde_json::from_str::<SkillSet>("[]").is_err() && serde_json::from_str::<SkillSet>(r#"["fly"]"#).is_err()
+        );
     }
 }

@@ -24,8 +24,7 @@ pub(super) fn draw_until<T: Send>(
         if feasible == count {
             break;
         }
-        let drawn: Vec<(u64, T)> =
-            (first..draws.min(first + BATCH)).map(|number| (number as u64, draw(rng))).collect();
+        let drawn: Vec<(u64, T)> = (first..draws.min(first + BATCH)).map(|number| (number as u64, draw(rng))).collect();
         let checked: Vec<Candidate> =
             drawn.into_par_iter().map(|(number, drawn)| check(drawn, &mut stream(seed, "arm", number))).collect();
         for candidate in checked {

@@ -97,7 +97,11 @@ impl Description {
             words: format!("{name} {mm} towards {degrees}"),
             short: format!("{mm} at {degrees} from ({x:.2}, {y:.2})"),
             facts: vec![
-                Fact { name: "from", text: format!("x {}, y {} m", metres(x), metres(y)), hint: "Where the tip starts" },
+                Fact {
+                    name: "from",
+                    text: format!("x {}, y {} m", metres(x), metres(y)),
+                    hint: "Where the tip starts",
+                },
                 Fact {
                     name: "length",
                     text: format!("{mm} to {degrees}"),

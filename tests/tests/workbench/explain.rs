@@ -84,7 +84,8 @@ fn the_layout_of_pushes_begins_with_the_chosen_push_and_a_branch_keeps_the_one_t
     let decision = window.session().pending.clone().expect("a decision");
     assert_eq!(window.model().candidate, None);
     window.layout(LayoutKind::Push);
-    let pushed = decision.candidates.iter().position(|candidate| Action::Manipulate(candidate.manipulation) == decision.action);
+    let pushed =
+        decision.candidates.iter().position(|candidate| Action::Manipulate(candidate.manipulation) == decision.action);
     let first = pushed.or(decision.best_push).expect("a push was weighed");
     assert_eq!(window.model().candidate, Some(first));
     let preview = window.model().preview.clone().expect("a prediction, unasked");

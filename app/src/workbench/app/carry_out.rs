@@ -11,9 +11,9 @@ use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::gain::RayDensity;
 use nudge_core::plan::{Action, Decision, PolicyKind, Reason, gain_field, gain_sources};
-use nudge_core::skill::{Manipulation, intended};
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
+use nudge_core::skill::{Manipulation, intended};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

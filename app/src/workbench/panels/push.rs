@@ -198,7 +198,8 @@ impl Here<'_> {
         order.sort_by(|a, b| rank(a.1).total_cmp(&rank(b.1)));
         let pushed = weighed::pushed(decision);
         for (at, candidate, ends) in order {
-            let picked = self.model.candidate == Some(*at) || over == Some(*at) || hovered == Some(candidate.manipulation);
+            let picked =
+                self.model.candidate == Some(*at) || over == Some(*at) || hovered == Some(candidate.manipulation);
             if picked {
                 lines(&painter, &drawn.frame, &candidate.manipulation.outline());
             }
@@ -255,7 +256,9 @@ impl Here<'_> {
         if let Some(rejection) = &candidate.rejection {
             ui.label(format!("Rejected: {}", candidate.manipulation.against(rejection)));
         }
-        let asked = |preview: &&Preview| preview.of == (self.session.id, self.step) && preview.manipulation == candidate.manipulation;
+        let asked = |preview: &&Preview| {
+            preview.of == (self.session.id, self.step) && preview.manipulation == candidate.manipulation
+        };
         match self.model.preview.as_ref().filter(asked) {
             Some(preview) => self.prediction(state, ui, preview, ask),
             None if self.session.setup.update.is_none() => {
@@ -361,7 +364,8 @@ impl Here<'_> {
     /// Offers the way to the state before the nearest push.
     fn way_to_push(&self, ui: &mut Ui, ask: &mut Vec<Command>) {
         let steps = self.session.record.steps.iter();
-        let mut pushes = steps.filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index).peekable();
+        let mut pushes =
+            steps.filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index).peekable();
         if pushes.peek().is_none() {
             ui.weak("No push was done in this episode");
         }

@@ -176,7 +176,11 @@ pub fn push_columns(decision: &Decision, counted: Counted) -> Vec<Column> {
     ];
     let width = |title: &str| if title == "mm" { 30.0 } else { 34.0 };
     columns.extend(numbers(decision).into_iter().map(|(title, hint)| Column { title, hint, width: width(title) }));
-    columns.push(Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 });
+    columns.push(Column {
+        title: "Note",
+        hint: "Whether it is chosen or the best, or why it was rejected",
+        width: 40.0,
+    });
     columns
 }
 
@@ -215,9 +219,10 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
             Some(rejection) => ("rejected".to_owned(), words::capital(&candidate.manipulation.against(rejection))),
             None => (String::new(), String::new()),
         };
-        let place = told.facts.first().map_or_else(String::new, |fact| {
-            words::capital(&format!("{} {}", fact.name, fact.text.replace('-', "−")))
-        });
+        let place = told
+            .facts
+            .first()
+            .map_or_else(String::new, |fact| words::capital(&format!("{} {}", fact.name, fact.text.replace('-', "−"))));
         let view = candidate.view.map_or_else(String::new, |view| format!("; best seen from view {}", view.0));
         let name = match (&candidate.rejection, value(candidate, gamma)) {
             (Some(rejection), _) => {

@@ -43,9 +43,13 @@ impl Painter {
             .filter(|outcome| asked.is_none() && looked_at.is_none() && outcome.prediction.is_some());
         let now = self.full(side.key(), &side.moment.belief);
         let grid = now.grid;
-        if self.differs(at::PREDICTED, format!("{:?} {looked_at:?} {:?}", side.key(), asked.map(|asked| asked.manipulation))) {
+        if self.differs(
+            at::PREDICTED,
+            format!("{:?} {looked_at:?} {:?}", side.key(), asked.map(|asked| asked.manipulation)),
+        ) {
             let swept = asked.map(|preview| &*preview.swept);
-            let swept = swept.or_else(|| led_here.and_then(|outcome| outcome.intervention.as_ref()).map(|told| &told.swept));
+            let swept =
+                swept.or_else(|| led_here.and_then(|outcome| outcome.intervention.as_ref()).map(|told| &told.swept));
             let swept = swept.map_or_else(Vec::new, |swept| {
                 let mut inside = vec![false; grid.voxel_count()];
                 swept.iter().for_each(|index| inside[index] = true);
@@ -170,7 +174,11 @@ mod tests {
         let side = Side::of(&session, 3);
         let done = push_of(&session.moments[4]).expect("step 4 is a push");
         let candidates = &side.decision.as_ref().expect("weighed").candidates;
-        let other = candidates.iter().map(|candidate| candidate.manipulation).find(|other| *other != done).expect("another one");
+        let other = candidates
+            .iter()
+            .map(|candidate| candidate.manipulation)
+            .find(|other| *other != done)
+            .expect("another one");
         assert!(happened(&side, Some(other)).is_none());
         assert_eq!(note(&side, Some(other)), "This push was not done");
         assert_eq!(happened(&side, Some(done)).map(|moment| moment.step), Some(4));

@@ -233,7 +233,7 @@ fn skills(scene: Scene) -> nudge_core::Result<Vec<SkillReport>> {
     }
     let drawn = episode.draw_candidates();
     let of = |kind: &SkillKind| {
-        let mine = || drawn.iter().filter(|candidate| candidate.manipulation.kind() == *kind);
+        let mine = || drawn.iter().filter(move |candidate| candidate.manipulation.kind() == *kind);
         let mut rejected = BTreeMap::new();
         for rejection in mine().filter_map(|candidate| candidate.rejection.as_ref()) {
             *rejected.entry(rejection.kind_words(*kind)).or_default() += 1;

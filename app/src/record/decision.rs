@@ -218,7 +218,7 @@ fn views(page: &mut String, setting: &Setting<'_>, decision: &Decision) {
 
 /// The candidates of a skill.
 fn manipulations(page: &mut String, decision: &Decision, kind: SkillKind, gamma: f32) {
-    let all = || decision.candidates.iter().enumerate().filter(|(_, c)| c.manipulation.kind() == kind);
+    let all = || decision.candidates.iter().enumerate().filter(move |(_, c)| c.manipulation.kind() == kind);
     if all().next().is_none() {
         return;
     }

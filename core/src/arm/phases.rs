@@ -47,18 +47,34 @@ impl Phase {
 /// A motion without a retreat goes back the way it came, as far as it came ([`PhasedMotion::way_back`]): that is known
 /// only once it is carried out, because an arm that is blocked turns round where it is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Filed")]
+#[serde(try_from = "Filed", into = "Filed")]
 pub struct PhasedMotion {
     /// The phases, each from where the one before it ended.
     pub phases: Vec<Phase>,
 }
 
-/// A motion as files have it: in phases, or as the way in and the way along that pushes had before there were phases.
-#[derive(Deserialize)]
+/// A motion as files have it: in phases, or, where there are but an approach and a contact with the gripper closed, as the
+/// way in and the way along that pushes had before there were phases.
+#[derive(Serialize, Deserialize)]
 struct Filed {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     phases: Option<Vec<Phase>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     way_in: Option<Motion>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     push: Option<Motion>,
+}
+
+impl From<PhasedMotion> for Filed {
+    fn from(motion: PhasedMotion) -> Self {
+        use PhaseKind::{Approach, Contact};
+        let plain = motion.phases.iter().map(|phase| (phase.kind, phase.opening_m)).eq([(Approach, 0.0), (Contact, 0.0)]);
+        if !plain {
+            return Self { phases: Some(motion.phases), way_in: None, push: None };
+        }
+        let mut motions = motion.phases.into_iter().map(|phase| phase.motion);
+        Self { phases: None, way_in: motions.next(), push: motions.next() }
+    }
 }
 
 impl TryFrom<Filed> for PhasedMotion {
@@ -182,10 +198,14 @@ mod tests {
         let (arm, motion) = motion();
         let [way_in, along] = [0, 1].map(|at: usize| serde_json::to_value(&motion.phases[at].motion).expect("JSON"));
         let old = serde_json::json!({ "way_in": way_in, "push": along });
-        let read: PhasedMotion = serde_json::from_value(old).expect("an old motion");
+        let read: PhasedMotion = serde_json::from_value(old.clone()).expect("an old motion");
         assert_eq!(read, motion);
-        let text = serde_json::to_string(&motion).expect("JSON");
-        assert_eq!(serde_json::from_str::<PhasedMotion>(&text).expect("a motion"), motion);
+        assert_eq!(serde_json::to_value(&motion).expect("JSON"), old, "and is written as it was");
+        let mut with_retreat = motion.clone();
+        with_retreat.phases.push(Phase::closed(PhaseKind::Retreat, motion.way_back(&arm.arm)));
+        let text = serde_json::to_string(&with_retreat).expect("JSON");
+        assert!(text.contains("\"phases\"") && !text.contains("way_in"), "{text}");
+        assert_eq!(serde_json::from_str::<PhasedMotion>(&text).expect("a motion"), with_retreat);
         assert_eq!(read.whole(&arm.arm), motion.whole(&arm.arm));
         let error = serde_json::from_str::<PhasedMotion>(r#"{"way_in": {"stops": []}}"#).expect_err("no motion");
         assert!(error.to_string().contains("`phases`"), "{error}");

@@ -238,7 +238,7 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
             Cell::nats(candidate.reg.map(|reg| gamma * reg)),
         ];
         cells.extend(columns.iter().map(|(title, _)| {
-            match told.parameters.iter().find(|parameter| parameter.column == Some(title)) {
+            match told.parameters.iter().find(|parameter| parameter.column == Some(*title)) {
                 Some(parameter) => Cell::Figure(f64::from(parameter.value), figure(parameter)),
                 None => Cell::Word(String::new()),
             }

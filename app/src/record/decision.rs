@@ -338,6 +338,26 @@ mod tests {
     }
 
     #[test]
+    fn every_skill_has_its_own_table_with_its_own_numbers() {
+        let mut decision = fixture::play(1).record.steps[0].decision.clone();
+        let candidate = |json: &str| CandidateRecord {
+            gain: Some(1.0),
+            ..CandidateRecord::of(serde_json::from_str::<Manipulation>(json).expect("a manipulation"))
+        };
+        decision.candidates = vec![
+            candidate(r#"{"kind": "push", "start": [0, 0.1, 0.06], "direction_deg": 90, "length_m": 0.1}"#),
+            candidate(
+                r#"{"kind": "drag", "start": [0, 0.2, 0.05], "direction_deg": -90, "length_m": 0.08, "pitch_deg": 45}"#,
+            ),
+        ];
+        let mut page = String::new();
+        SkillKind::ALL.iter().for_each(|kind| manipulations(&mut page, &decision, *kind, 0.2));
+        assert!(page.contains("**Pushes**: 1 drawn") && page.contains("**Drags**: 1 drawn"), "{page}");
+        assert!(page.contains("| 1 | 0.00 | 0.20 | 0.05 | -90 | 80 | 45 |"), "{page}");
+        assert!(page.contains("| 0 | 0.00 | 0.10 | 0.06 | 90 | 100 | 0.0 s |"), "{page}");
+    }
+
+    #[test]
     fn a_blocked_push_tells_how_far_it_was_to_go() {
         let played = fixture::play(1);
         let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.14 };

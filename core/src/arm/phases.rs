@@ -68,7 +68,8 @@ struct Filed {
 impl From<PhasedMotion> for Filed {
     fn from(motion: PhasedMotion) -> Self {
         use PhaseKind::{Approach, Contact};
-        let plain = motion.phases.iter().map(|phase| (phase.kind, phase.opening_m)).eq([(Approach, 0.0), (Contact, 0.0)]);
+        let plain =
+            motion.phases.iter().map(|phase| (phase.kind, phase.opening_m)).eq([(Approach, 0.0), (Contact, 0.0)]);
         if !plain {
             return Self { phases: Some(motion.phases), way_in: None, push: None };
         }

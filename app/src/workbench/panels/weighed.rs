@@ -268,6 +268,31 @@ fn figure(parameter: &Parameter) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nudge_core::skill::Manipulation;
+
+    #[test]
+    fn candidates_of_two_skills_share_a_table_and_say_which_they_are() {
+        let mut decision = crate::fixture::play(1).record.steps[0].decision.clone();
+        let candidate = |json: &str, gain: f32| CandidateRecord {
+            gain: Some(gain),
+            ..CandidateRecord::of(serde_json::from_str::<Manipulation>(json).expect("a manipulation"))
+        };
+        decision.candidates = vec![
+            candidate(r#"{"kind": "push", "start": [0, 0.1, 0.06], "direction_deg": 90, "length_m": 0.1}"#, 2.0),
+            candidate(
+                r#"{"kind": "drag", "start": [0, 0.2, 0.05], "direction_deg": -90, "length_m": 0.08, "pitch_deg": 45}"#,
+                1.0,
+            ),
+        ];
+        let titles: Vec<&str> = push_columns(&decision, Counted::All).iter().map(|column| column.title).collect();
+        assert_eq!(titles, ["Push", "Value", "Gain", "γ·Reg", "To", "mm", "Down", "Note"]);
+        let rows = push_rows(&decision, 0.2, Listed::All, None);
+        assert!(rows.iter().all(|row| row.cells.len() == titles.len()));
+        assert!(rows[0].name.starts_with("Push 0, value") && rows[1].name.starts_with("Drag 1, value"));
+        // With pushes alone the table is as it was.
+        decision.candidates.truncate(1);
+        assert_eq!(push_columns(&decision, Counted::All).len(), 7);
+    }
 
     #[test]
     fn a_gain_by_coverage_is_not_explained_as_a_sum_over_rays() {

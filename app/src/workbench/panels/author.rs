@@ -54,7 +54,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
 
 /// A class that is carried from the palette, and whether it was let go in this frame.
 #[derive(Clone, Copy)]
-struct Moved {
+struct Carried {
     class: ClassId,
     at: egui::Pos2,
     is_let_go: bool,

@@ -77,7 +77,7 @@ impl Subject<'_> {
         }
         let action = match outcome.record.action {
             Action::Look { view } => format!("look from view {}", view.0),
-            Action::Manipulate(_) => "push".to_owned(),
+            Action::Manipulate(done) => done.kind().name().to_owned(),
         };
         (!causes.is_empty()).then_some(Change { step: after.step, action, causes, from_to })
     }

@@ -2,7 +2,7 @@
 
 mod draw;
 
-use super::{Moved, choice};
+use super::{Carried, choice};
 use crate::workbench::author::{Author, Choose, Gesture, Snap, name};
 use draw::Ink;
 use nudge_core::scene::{Shelf, outline};
@@ -49,7 +49,7 @@ impl Board {
 
 /// Draws the board in what is left of `ui`, and carries out what the pointer does there. Returns whether the keyboard's
 /// focus is on the board.
-pub(super) fn show(ui: &mut egui::Ui, author: &mut Author, carried: Option<Moved>) -> bool {
+pub(super) fn show(ui: &mut egui::Ui, author: &mut Author, carried: Option<Carried>) -> bool {
     let (space, canvas) = ui.allocate_exact_size(ui.available_size().max(Vec2::splat(80.0)), Sense::click_and_drag());
     let board = Board::fitting(&author.scene().shelf, space);
     canvas.widget_info(|| WidgetInfo::labeled(WidgetType::Other, true, "Board from above"));
@@ -184,8 +184,8 @@ fn pointer(ui: &egui::Ui, author: &mut Author, board: &Board, canvas: &egui::Res
     ui.ctx().set_cursor_icon(cursor);
 }
 
-fn drop_class(author: &mut Author, board: &Board, carried: Option<Moved>, space: Rect) {
-    if let Some(Moved { class, at, is_let_go: true }) = carried
+fn drop_class(author: &mut Author, board: &Board, carried: Option<Carried>, space: Rect) {
+    if let Some(Carried { class, at, is_let_go: true }) = carried
         && space.contains(at)
     {
         let class = author.catalog().class(class).name.clone();
@@ -194,8 +194,8 @@ fn drop_class(author: &mut Author, board: &Board, carried: Option<Moved>, space:
 }
 
 /// The class that is carried, where it would come to stand.
-fn ghost(painter: &egui::Painter, ink: &Ink, author: &Author, board: &Board, carried: Option<Moved>, space: Rect) {
-    let Some(Moved { class, at, is_let_go: false }) = carried else { return };
+fn ghost(painter: &egui::Painter, ink: &Ink, author: &Author, board: &Board, carried: Option<Carried>, space: Rect) {
+    let Some(Carried { class, at, is_let_go: false }) = carried else { return };
     let class = author.catalog().class(class);
     let position = board.board(at);
     let position = if space.contains(at) { position.map(|v| author.snap.position(v)) } else { position };

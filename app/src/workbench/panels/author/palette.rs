@@ -1,6 +1,6 @@
 //! The classes: a click adds one where there is room, a drag puts it where it is let go.
 
-use super::{Moved, colour};
+use super::{Carried, colour};
 use crate::colors;
 use crate::workbench::author::Author;
 use re_viewer::external::egui::{self, Align2, Sense, TextStyle, WidgetInfo, WidgetType};
@@ -9,7 +9,7 @@ const ROW_HEIGHT: f32 = 34.0;
 const SWATCH: f32 = 16.0;
 
 /// Draws the list; returns the class that is being carried to the board.
-pub(super) fn show(ui: &mut egui::Ui, author: &mut Author) -> Option<Moved> {
+pub(super) fn show(ui: &mut egui::Ui, author: &mut Author) -> Option<Carried> {
     ui.add_space(6.0);
     ui.strong("Add an object");
     ui.weak("Click, or drag onto the board");
@@ -17,7 +17,7 @@ pub(super) fn show(ui: &mut egui::Ui, author: &mut Author) -> Option<Moved> {
     egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| rows(ui, author)).inner
 }
 
-fn rows(ui: &mut egui::Ui, author: &mut Author) -> Option<Moved> {
+fn rows(ui: &mut egui::Ui, author: &mut Author) -> Option<Carried> {
     let mut carried = None;
     let mut clicked = None;
     ui.spacing_mut().item_spacing.y = 1.0;
@@ -56,7 +56,7 @@ fn rows(ui: &mut egui::Ui, author: &mut Author) -> Option<Moved> {
         if response.dragged() || response.drag_stopped() {
             ui.ctx().set_cursor_icon(egui::CursorIcon::Grabbing);
             if let Some(at) = ui.input(|input| input.pointer.latest_pos()) {
-                carried = Some(Moved { class: class.id, at, is_let_go: response.drag_stopped() });
+                carried = Some(Carried { class: class.id, at, is_let_go: response.drag_stopped() });
             }
         }
         if response.clicked() {

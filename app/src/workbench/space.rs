@@ -275,9 +275,17 @@ impl Painter {
         for entity in [at::BELIEF, at::PREDICTED, at::DIFFERENCE, at::HAPPENED, at::GAIN, at::OTHER, at::BETWEEN] {
             self.log_voxels(entity, &grid, Vec::new(), |_| [0; 3]);
         }
-        for entity in
-            [at::ARM_PATH, at::EDGES, at::VIEWS, at::CURRENT, at::HOVERED, at::PICKED, at::OBJECTS, at::OTHER_OBJECTS]
-        {
+        for entity in [
+            at::ARM_PATH,
+            at::LINES,
+            at::EDGES,
+            at::VIEWS,
+            at::CURRENT,
+            at::HOVERED,
+            at::PICKED,
+            at::OBJECTS,
+            at::OTHER_OBJECTS,
+        ] {
             self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
         }
         for entity in [at::CANDIDATES, at::CHOSEN] {

@@ -3,6 +3,7 @@ use super::*;
 use crate::belief::CHANGED;
 use crate::plan::{PlannerSettings, PolicyKind};
 use crate::score::Verdict;
+use crate::skill::Push;
 
 /// What a step is but for its seconds.
 fn timeless(step: &StepRecord) -> StepRecord {

@@ -3,6 +3,7 @@ use crate::belief::Classical;
 use crate::episode::{Agreement, EpisodeConfig, Overwrite, replay, resume};
 use crate::plan::{PlannerSettings, PolicyKind};
 use crate::scene::{Object, Scene, Shelf};
+use crate::skill::Push;
 use std::fs;
 use std::path::PathBuf;
 use std::time::SystemTime;

@@ -148,7 +148,7 @@ impl<'a> HeatMap<'a> {
         let views: Vec<&View> = self.views.views.iter().filter(|view| view.slot[2] == target).collect();
         let title = views.first().map_or("no views".to_owned(), |view| {
             let [x, y, z] = view.target.map(words::metres);
-            format!("looks at {x}, {y}, {z} m")
+            format!("at {x}, {y}, {z} m")
         });
         ui.label(RichText::new(title).small())
             .on_hover_text("The look-at target: x to the right, y into the shelf, z up");
@@ -281,7 +281,7 @@ fn spread(state: &mut State, ui: &mut Ui, model: &Model, session: &Session, view
                         colour: legend::ink(Colormap::Cividis.rgb(nats[part] / largest)),
                         strong: false,
                     };
-                    spark::bar(ui, &bar, 68.0, 36.0);
+                    spark::bar(ui, &bar, 84.0, 40.0);
                 }
             });
         }

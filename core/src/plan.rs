@@ -26,7 +26,7 @@ pub use weigh::{disturbance, draw_pushes};
 pub use worth::{COARSE_VIEWS, Sources};
 
 use crate::arm::{ArmTool, Push, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, CNABU};
+use crate::belief::{Belief, BeliefUpdate};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
 use crate::push::{PushTruth, Rejection};

@@ -40,7 +40,7 @@ fn a_recording_stays_small_and_names_its_entities() {
             step,
             bodies: &played.bodies[step],
             belief: &played.beliefs[step],
-            seen: None,
+            seen: &VoxelSet::empty(&played.beliefs[step].grid),
             truth: &played.truths[step],
             scores,
         };

@@ -168,7 +168,7 @@ fn pushes(
     if decision.candidates.is_empty() {
         return;
     }
-    let table = push_table(ui, &mut state.pushes, &mut state.rejected, model, session, decision, 220.0);
+    let table = push_table(ui, &mut state.pushes, &mut state.rejected, model, decision, 220.0);
     apply_push(table, decision, touched, ask);
     push_button(ui, session, model, decision, ask);
 }
@@ -179,7 +179,6 @@ pub fn push_table(
     sort: &mut Sort,
     rejected: &mut bool,
     model: &Model,
-    session: &Session,
     decision: &Decision,
     height: f32,
 ) -> table::Touched {

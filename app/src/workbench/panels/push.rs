@@ -135,7 +135,7 @@ impl Here<'_> {
         heading(ui, title, "Every arrow is the path of the tool's tip; the colour is its value, gain + γ·Reg in nats");
         self.floor(state, ui, decision, touched, ask);
         let State { sort, rejected, .. } = state;
-        let table = decision::push_table(ui, sort, rejected, self.model, self.session, decision, 190.0);
+        let table = decision::push_table(ui, sort, rejected, self.model, decision, 190.0);
         decision::apply_push(table, decision, touched, ask);
         decision::push_button(ui, self.session, self.model, decision, ask);
         ui.add_space(6.0);

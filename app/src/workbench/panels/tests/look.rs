@@ -4,7 +4,7 @@
 use super::{Show, Stage};
 use crate::workbench::fixture::{self, Script};
 use crate::workbench::model::{LayoutKind, Model, Picked};
-use crate::workbench::panels::{self, camera, compare, curves, decision, episode, gains, maps, push, weighed, why};
+use crate::workbench::panels::{self, camera, compare, curves, decision, episode, gains, maps, push, why};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use nudge_core::camera::ViewId;

@@ -146,15 +146,9 @@ fn decision(views: &ViewArray, index: usize) -> Decision {
     let second = ViewId(((index * 97 + 131) % count) as u16);
     let gains = (0..count).map(|at| 500.0 + 300.0 * ((at * 7 + index * 31) as f32 * 0.02).sin()).collect();
     Decision {
-        action: Action::Look { view },
-        reason: Reason::LookTellsMore,
         igv: 1234.5,
-        igm: 0.0,
-        reg: 0.0,
         pair: vec![view, second],
         gains,
-        candidates: Vec::new(),
-        best_push: None,
-        motion: None,
+        ..Decision::unweighed(Action::Look { view }, Reason::LookTellsMore)
     }
 }

@@ -32,9 +32,8 @@ use nudge_core::arm::{ArmTool, Joints};
 use nudge_core::belief::{Belief, PushPrediction};
 use nudge_core::camera::{Image, View, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
-use nudge_core::gain::GainField;
 use nudge_core::grid::{Grid, VoxelSet};
-use nudge_core::plan::{Action, PlannerSettings, gain_field};
+use nudge_core::plan::{self, Action, PlannerSettings};
 use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
@@ -74,8 +73,8 @@ pub struct State<'a> {
     pub bodies: &'a [Body],
     /// What is believed.
     pub belief: &'a Belief,
-    /// Voxels that do not count as a gain any more, if some do not.
-    pub seen: Option<&'a VoxelSet>,
+    /// Voxels that looks have seen and that no push has probably changed since.
+    pub seen: &'a VoxelSet,
     /// What is.
     pub truth: &'a TruthMap,
     /// How they compare.
@@ -91,8 +90,8 @@ pub struct Recorder {
     file: PathBuf,
     /// What is wrong with the file.
     fault: Fault,
-    /// The belief before the next step, as rays see it.
-    field: Option<GainField>,
+    /// What can be gained in the next step.
+    gain: Option<plan::Gain>,
     /// Objects with a mesh in the recording that have not been cleared.
     shown: BTreeSet<ObjectId>,
     /// The truth that was last recorded.
@@ -133,7 +132,7 @@ impl Recorder {
             root: EntityPath::parse_forgiving(root),
             file: file.to_owned(),
             fault,
-            field: None,
+            gain: None,
             shown: BTreeSet::new(),
             truth: None,
             robot_s: 0.0,
@@ -156,7 +155,7 @@ impl Recorder {
 
     /// Records a state with what led to it: without an outcome the prior. States come in the order of their steps.
     pub fn record(&mut self, setting: &Setting<'_>, state: &State<'_>, outcome: Option<&StepOutcome>) -> Result<()> {
-        let gain = outcome.zip(self.field.as_ref()).and_then(|(outcome, field)| gain::of(setting, field, outcome));
+        let gain = outcome.zip(self.gain.as_ref()).and_then(|(outcome, gain)| gain::of(setting, gain, outcome));
         let surprise = outcome.and_then(|outcome| outcome.prediction.as_ref()).zip(self.truth.as_ref());
         let surprise = surprise
             .map(|(predicted, before)| predicted.surprise(&state.belief.grid, &before.changed_cells(state.truth)));
@@ -171,7 +170,7 @@ impl Recorder {
                 self.note(line, rerun::TextLogLevel::INFO)?;
             }
         }
-        self.field = Some(gain_field(state.belief, state.seen));
+        self.gain = Some(plan::Gain::new(setting.planner.counted, state.belief, state.seen));
         self.flush()
     }
 
@@ -331,7 +330,7 @@ impl Recorder {
         self.log_or_clear(paths::GAIN_VOXELS, gain.map(|gain| voxels::gains(grid, &gain.nats)))?;
         self.log_or_clear(paths::GAIN_LABEL, gain.map(|gain| gain.label(setting.shelf)))?;
         let any = !decision.candidates.is_empty();
-        self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision, setting.planner.gamma)))?;
+        self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision)))?;
         match (record.action, &outcome.image) {
             (Action::Look { view }, Some(image)) => self.look(setting, view, image)?,
             _ => {

@@ -17,7 +17,7 @@ pub use summary::{Measure, MeasureSummary, StepSummary};
 use crate::arm::{Push, PushMotion};
 use crate::belief::BeliefUpdate;
 use crate::episode::{Difference, Episode, EpisodeDir, EpisodeRecord, StepRecord, StoredTruth, revisit};
-use crate::plan::{Action, CandidateRecord, Reason};
+use crate::plan::{Action, CandidateRecord, Reason, ranked};
 use crate::push::{ArmClearance, PushTruth};
 use crate::rng::stream;
 use crate::scene::Catalog;
@@ -84,6 +84,13 @@ pub struct StepProbe {
     pub agrees: Option<bool>,
     /// Feasible candidates for which the arm has no motion now; none where the belief is that of the log.
     pub left_out: usize,
+}
+
+impl StepProbe {
+    /// Positions in `pushes` as the planner ranks them: the best one first.
+    pub fn ranked(&self) -> Vec<usize> {
+        ranked(self.chosen, self.pushes.iter().map(|push| push.promised_gain))
+    }
 }
 
 /// The steps of a record whose decisions have feasible push candidates, with how many: what can be probed.

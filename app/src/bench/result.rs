@@ -186,7 +186,7 @@ impl EpisodeResult {
 impl StepResult {
     fn new(step: &StepRecord) -> Self {
         let gain = match step.action {
-            Action::Look { view } => step.decision.gains.get(usize::from(view.0)).copied(),
+            Action::Look { .. } => step.decision.promised(),
             Action::Push(_) => None,
         };
         Self {

@@ -2,7 +2,7 @@
 
 use super::Setting;
 use nudge_core::episode::StepRecord;
-use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, Reason};
+use nudge_core::plan::{Action, CandidateRecord, Comparison, Decision, Term, TermKind, Winner};
 use nudge_core::push::Rejection;
 use nudge_core::score::Scores;
 use std::fmt::Write as _;
@@ -87,7 +87,7 @@ pub fn line(record: &StepRecord) -> String {
         "step {}: {} ({}); {}",
         record.index,
         action(&record.action),
-        reason(record.decision.reason),
+        record.decision.reason.words(),
         scores_line(&record.scores)
     )
 }
@@ -123,25 +123,6 @@ pub(crate) fn action(action: &Action) -> String {
     }
 }
 
-/// A reason in words.
-pub(crate) fn reason(reason: Reason) -> &'static str {
-    match reason {
-        Reason::LookTellsMore => "looking tells more",
-        Reason::PushTellsLittle => "no push promises enough",
-        Reason::PushTellsMore => "pushing tells more",
-        Reason::PushReveals => "the push really brings something hidden into sight",
-        Reason::ViewOfPush => "the view that made the push worth it",
-        Reason::TooEarly => "no push in the first steps",
-        Reason::LastStep => "no push in the last steps",
-        Reason::JustPushed => "no push soon after a push",
-        Reason::MapComplete => "the map is complete",
-        Reason::Dropped => "an object was dropped, so no more pushes",
-        Reason::NoCandidate => "no feasible push",
-        Reason::Schedule => "the policy's schedule",
-        Reason::Manual => "chosen by hand",
-    }
-}
-
 /// The decision of a step as a page.
 pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     let decision = &record.decision;
@@ -150,11 +131,11 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
         record.index,
         setting.budget,
         action(&record.action),
-        capital(reason(decision.reason))
+        capital(&decision.comparison().because)
     );
-    weighed(&mut page, decision, setting);
+    weighed(&mut page, &decision.comparison());
     views(&mut page, setting, decision);
-    pushes(&mut page, decision, setting.planner.gamma);
+    pushes(&mut page, decision);
     let scores = &record.scores;
     let _ = write!(
         page,
@@ -168,21 +149,20 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     page
 }
 
-fn weighed(page: &mut String, decision: &Decision, setting: &Setting<'_>) {
-    let PlannerSettings { counted, gamma, .. } = *setting.planner;
-    let sign = |holds: bool| if holds { " ◀" } else { "" };
-    let push = decision.igm + gamma * decision.reg;
-    let (looks, pushed) = (matches!(decision.action, Action::Look { .. }), decision.best_push.is_some());
+fn weighed(page: &mut String, comparison: &Comparison) {
+    let sign = |winner: Winner| if comparison.winner == winner { " ◀" } else { "" };
     page.push_str("| weighed | nats |\n|:--|--:|\n");
-    let _ = writeln!(page, "| look: IGV, {}{} | {:.1} |", counted.of_looks(), sign(looks), decision.igv);
-    if pushed {
-        let asked = setting.planner.asked_of_pushes(decision.igv);
-        if asked != decision.igv {
-            let _ = writeln!(page, "|    what a push has to promise | {asked:.1} |");
+    for Term { kind, nats, words, .. } in &comparison.terms {
+        let row = match kind {
+            TermKind::Look => format!("look: IGV, {words}{}", sign(Winner::Look)),
+            TermKind::Threshold => format!("   what a push has to promise: {words}"),
+            TermKind::Push => format!("   IGM, {words}"),
+            TermKind::Disturbance => format!("   γ·Reg, {words}"),
+        };
+        if let (TermKind::Push, Some(pushing)) = (kind, comparison.pushing) {
+            let _ = writeln!(page, "| push: IGM + γ·Reg{} | {pushing:.1} |", sign(Winner::Push));
         }
-        let _ = writeln!(page, "| push: IGM + γ·Reg{} | {push:.1} |", sign(!looks));
-        let _ = writeln!(page, "|    IGM, {} | {:.1} |", counted.of_pushes(), decision.igm);
-        let _ = writeln!(page, "|    γ·Reg, what it would blur | {:.1} |", gamma * decision.reg);
+        let _ = writeln!(page, "| {row} | {nats:.1} |");
     }
     page.push('\n');
 }
@@ -206,14 +186,13 @@ fn views(page: &mut String, setting: &Setting<'_>, decision: &Decision) {
     page.push_str("\n● best pair\n\n");
 }
 
-fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
+fn pushes(page: &mut String, decision: &Decision) {
     if decision.candidates.is_empty() {
         return;
     }
-    let value = |c: &CandidateRecord| c.gain.map(|gain| gain + gamma * c.reg.unwrap_or(0.0));
-    let mut feasible: Vec<(usize, f32, &CandidateRecord)> =
-        decision.candidates.iter().enumerate().filter_map(|(at, c)| Some((at, value(c)?, c))).collect();
-    feasible.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let ranked = decision.ranked_candidates().into_iter();
+    let feasible: Vec<(usize, &CandidateRecord)> =
+        ranked.map(|at| (at, &decision.candidates[at])).filter(|(_, c)| c.rejection.is_none()).collect();
     let count = |is: fn(&Rejection) -> bool| {
         decision.candidates.iter().filter(|c| c.rejection.as_ref().is_some_and(is)).count()
     };
@@ -234,17 +213,19 @@ fn pushes(page: &mut String, decision: &Decision, gamma: f32) {
     page.push_str(
         "| push | from x, y (m) | towards | length | arm | gain | Reg | value, nats |\n|--:|:--|--:|--:|--:|--:|--:|--:|\n",
     );
-    for (at, value, c) in feasible.iter().take(LISTED) {
+    let nats = |value: Option<f32>| value.map_or("–".to_owned(), |value| format!("{value:.1}"));
+    for (at, c) in feasible.iter().take(LISTED) {
         let best = if decision.best_push == Some(*at) { " ●" } else { "" };
         let [x, y, _] = c.push.start;
         let _ = writeln!(
             page,
-            "| {at}{best} | {x:.2}, {y:.2} | {:.0}° | {:.0} mm | {:.1} s | {:.1} | {:.1} | {value:.1} |",
+            "| {at}{best} | {x:.2}, {y:.2} | {:.0}° | {:.0} mm | {:.1} s | {} | {} | {} |",
             c.push.direction_deg,
             c.push.length_m * 1e3,
             c.motion_s.unwrap_or(0.0),
-            c.gain.unwrap_or(0.0),
-            c.reg.unwrap_or(0.0)
+            nats(c.gain),
+            nats(c.reg),
+            nats(decision.value_of(c))
         );
     }
     page.push('\n');
@@ -288,37 +269,43 @@ mod tests {
     use crate::fixture;
     use nudge_core::arm::{ArmTool, Push};
     use nudge_core::episode::PushReport;
+    use nudge_core::plan::{PlannerSettings, PolicyKind, Reason, Rule};
 
     #[test]
-    fn the_page_of_a_push_shows_what_it_had_to_promise() {
+    fn the_page_of_a_push_shows_what_it_had_to_promise_and_lists_the_best_push_first() {
         let played = fixture::play(4);
-        let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 };
         let (mut record, arm) = (played.record.steps[3].clone(), ArmTool::standard(played.record.scene.shelf));
-        record.decision = Decision {
-            action: Action::Push(push),
-            reason: Reason::PushTellsMore,
-            igv: 30.0,
-            igm: 400.0,
-            reg: -50.0,
-            best_push: Some(0),
-            ..record.decision
-        };
-        let page = |planner: &PlannerSettings| {
+        let push = |length_m| Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m };
+        let weighed = |gain, length_m| CandidateRecord { gain: Some(gain), ..CandidateRecord::of(push(length_m)) };
+        let mut page = |settings: PlannerSettings| {
+            record.decision = Decision {
+                igv: 30.0,
+                igm: 400.0,
+                reg: -50.0,
+                candidates: vec![weighed(500.0, 0.11), weighed(400.0, 0.12), weighed(600.0, 0.13)],
+                best_push: Some(1),
+                rule: Some(Rule { policy: PolicyKind::Mem, settings }),
+                ..Decision::unweighed(Action::Push(push(0.12)), Reason::PushTellsMore)
+            };
             let setting = Setting {
                 shelf: &played.record.scene.shelf,
                 catalog: &played.catalog,
                 views: &played.views,
                 budget: 4,
-                planner,
+                planner: &PlannerSettings::default(),
                 arm: &arm,
                 unreachable: &[],
             };
             markdown(&setting, &record)
         };
-        let patient = PlannerSettings { patience: 10.0, push_floor: 50.0, ..PlannerSettings::default() };
-        let with = page(&patient);
-        assert!(with.contains("what a push has to promise | 300.0 |") && with.contains("γ·Reg ◀ | 390.0 |"), "{with}");
-        assert!(!page(&PlannerSettings::default()).contains("has to promise"), "the paper's rule compares IGV itself");
+        let with = page(PlannerSettings { patience: 10.0, push_floor: 50.0, ..PlannerSettings::default() });
+        assert!(with.contains("what a push has to promise: ") && with.contains("(patience) | 300.0 |"), "{with}");
+        assert!(with.contains("γ·Reg ◀ | 390.0 |"), "{with}");
+        let rows: Vec<&str> = with.lines().filter(|line| line.contains(" mm | ")).collect();
+        let lengths = |row: &&str| ["110", "120", "130"].iter().position(|mm| row.contains(&format!("{mm} mm")));
+        assert_eq!(rows.iter().filter_map(lengths).collect::<Vec<_>>(), [1, 2, 0], "{with}");
+        assert!(rows[0].starts_with("| 1 ● |"), "{with}");
+        assert!(!page(PlannerSettings::default()).contains("has to promise"), "the paper's rule compares IGV itself");
     }
 
     #[test]

@@ -188,9 +188,8 @@ pub fn segmentation(labels: Vec<u8>, size: [u32; 2]) -> rerun::SegmentationImage
 }
 
 /// The push candidates as arrows: feasible ones by value in the colours of the gain, rejected ones thin and grey.
-pub fn candidates(decision: &Decision, gamma: f32) -> rerun::Arrows3D {
-    let value = |gain: Option<f32>, reg: Option<f32>| gain.map(|gain| gain + gamma * reg.unwrap_or(0.0));
-    let values: Vec<Option<f32>> = decision.candidates.iter().map(|c| value(c.gain, c.reg)).collect();
+pub fn candidates(decision: &Decision) -> rerun::Arrows3D {
+    let values: Vec<Option<f32>> = decision.candidates.iter().map(|c| decision.value_of(c)).collect();
     let best = values.iter().flatten().copied().fold(f32::MIN_POSITIVE, f32::max);
     let worst = values.iter().flatten().copied().fold(best, f32::min);
     let pushes = || decision.candidates.iter().map(|candidate| &candidate.push);

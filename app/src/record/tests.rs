@@ -2,7 +2,8 @@ use super::*;
 use crate::fixture;
 use nudge_core::arm::ArmTool;
 use nudge_core::gain::{Openings, RayDensity};
-use nudge_core::plan::Counted;
+use nudge_core::grid::VoxelSet;
+use nudge_core::plan::{self, Counted};
 
 /// Where a test keeps its output: `NUDGE_KEEP` if that is set, else a directory that goes with the guard.
 fn output() -> (PathBuf, Option<tempfile::TempDir>) {
@@ -39,7 +40,7 @@ fn a_recording_stays_small_and_names_its_entities() {
             step,
             bodies: &played.bodies[step],
             belief: &played.beliefs[step],
-            seen: None,
+            seen: &VoxelSet::empty(&played.beliefs[step].grid),
             truth: &played.truths[step],
             scores,
         };
@@ -111,6 +112,8 @@ fn a_pushs_gain_is_drawn_as_its_own_worth_and_not_as_that_of_the_view_after_it()
     let arm = ArmTool::standard(played.record.scene.shelf);
     let (outcome, before) = (&played.outcomes[3], &played.beliefs[3]);
     let Action::Push(push) = outcome.record.action else { panic!("the fourth action is a push") };
+    let none = VoxelSet::empty(&before.grid);
+    let counting = |counted| plan::Gain::new(counted, before, &none);
     let drawn = |counted| {
         let setting = Setting {
             shelf: &played.record.scene.shelf,
@@ -121,10 +124,11 @@ fn a_pushs_gain_is_drawn_as_its_own_worth_and_not_as_that_of_the_view_after_it()
             arm: &arm,
             unreachable: &[],
         };
-        gain::of(&setting, &gain_field(before, None), outcome).expect("a gain")
+        gain::of(&setting, &counting(counted), outcome).expect("a gain")
     };
     let ids: Vec<ViewId> = played.views.views.iter().map(|view| view.id).step_by(5).collect();
-    let openings = Openings::new(&gain_field(before, None), &played.views, &ids, RayDensity::COARSE);
+    let unseen = counting(Counted::Unseen);
+    let openings = Openings::new(unseen.field(), &played.views, &ids, RayDensity::COARSE);
     let opened = openings.under_each(outcome.prediction.as_slice())[0];
     let gain = drawn(Counted::Unseen);
     let sum: f32 = gain.nats.iter().map(|(_, nats)| nats).sum();

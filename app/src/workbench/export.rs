@@ -138,7 +138,7 @@ fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Wa
             step: moment.step,
             bodies: &moment.bodies,
             belief: &belief,
-            seen: moment.seen.as_deref(),
+            seen: &moment.seen,
             truth: &moment.truth,
             scores: &moment.scores,
         };

@@ -8,7 +8,7 @@ use nudge_core::belief::{BeliefUpdate, Classical, SweptPush};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
 use nudge_core::gain::RayDensity;
-use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, gain_field, gain_sources};
+use nudge_core::plan::{Action, Decision, Gain, PlannerSettings, PolicyKind, Reason};
 use nudge_core::push::swept_by;
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
 use nudge_core::world::TruthMap;
@@ -98,7 +98,7 @@ fn moment(episode: &Episode, outcome: Option<Arc<StepOutcome>>, truth: &mut Arc<
     Arc::new(Moment {
         step: record.steps.len(),
         belief: HalfBelief::of(episode.belief()),
-        seen: episode.seen().cloned().map(Arc::new),
+        seen: Arc::new(episode.seen().clone()),
         truth: truth.clone(),
         bodies: Arc::new(episode.bodies()),
         scores: record.steps.last().map_or(record.prior, |step| step.scores),
@@ -171,12 +171,8 @@ pub fn answer(model: &mut Model) {
         Preview { of: (session.id, step), push, prediction: Arc::new(prediction), swept: Arc::new(swept) }
     });
     let source = model.view.map(|view| {
-        let nats = gain_sources(
-            &gain_field(&belief, session.moment(step).seen.as_deref()),
-            &session.setup.views,
-            view,
-            RayDensity::FULL,
-        );
+        let gain = Gain::new(session.record.config.planner.counted, &belief, &session.moment(step).seen);
+        let nats = gain.per_voxel(&session.setup.views, view, RayDensity::FULL);
         GainSource::new((session.id, step), view, nats)
     });
     model.preview = preview;

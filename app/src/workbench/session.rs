@@ -55,8 +55,8 @@ pub struct Moment {
     pub step: usize,
     /// What is believed, in half precision.
     pub belief: HalfBelief,
-    /// Voxels that do not count as a gain any more, if the planner leaves some out.
-    pub seen: Option<Arc<VoxelSet>>,
+    /// Voxels that looks have seen and that no push has probably changed since.
+    pub seen: Arc<VoxelSet>,
     /// What is; shared by all moments between two pushes.
     pub truth: Arc<TruthMap>,
     /// The bodies where they stand, dropped ones left out; shared like the truth.

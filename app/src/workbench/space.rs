@@ -96,8 +96,6 @@ pub struct Side {
     pub after: Option<Arc<Moment>>,
     /// What was decided at the cursor, or is pending.
     pub decision: Option<Arc<Decision>>,
-    /// The weight of the disturbance term in the episode's decisions.
-    pub gamma: f32,
 }
 
 impl Side {
@@ -112,7 +110,6 @@ impl Side {
             before: step.checked_sub(1).map(|before| session.moment(before).clone()),
             after: session.moments.get(step + 1).cloned(),
             decision: session.decision_after(step).cloned().map(Arc::new),
-            gamma: session.record.config.planner.gamma,
             moment,
         }
     }

@@ -273,7 +273,7 @@ fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Momen
     Moment {
         step: episode.record().steps.len(),
         belief: HalfBelief::of(episode.belief()),
-        seen: episode.seen().cloned().map(Arc::new),
+        seen: Arc::new(episode.seen().clone()),
         truth: shared.map_or_else(|| Arc::new(episode.truth().clone()), |before| before.truth.clone()),
         bodies: shared.map_or_else(|| Arc::new(episode.bodies()), |before| before.bodies.clone()),
         scores: outcome.as_ref().map_or(episode.record().prior, |outcome| outcome.record.scores),

@@ -33,7 +33,7 @@ impl EpisodeRecord {
             }
             None => return Err(Error::input(path, "format", "is missing: not an episode")),
         }
-        let record: Self = serde_json::from_str(text).map_err(|error| input_error(path, &error))?;
+        let mut record: Self = serde_json::from_str(text).map_err(|error| input_error(path, &error))?;
         for (at, step) in record.steps.iter().enumerate() {
             if step.index != at + 1 {
                 let place = format!("steps[{at}].index");
@@ -47,6 +47,9 @@ impl EpisodeRecord {
             let message = format!("{} steps in a budget of {}", record.steps.len(), record.config.budget);
             return Err(Error::input(path, "steps", message));
         }
+        // Older versions did not take the rule down with every decision: it was the episode's.
+        let rule = record.config.rule();
+        record.steps.iter_mut().for_each(|step| _ = step.decision.rule.get_or_insert(rule));
         Ok(record)
     }
 }

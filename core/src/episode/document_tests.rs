@@ -53,6 +53,18 @@ fn lines_stand_for_parts_of_steps() {
 }
 
 #[test]
+fn a_decision_of_an_older_version_takes_its_rule_from_the_episode_and_a_newer_one_keeps_its_own() {
+    let mut record = synthetic::record(2);
+    record.steps[0].decision.rule = None;
+    let text = record.to_json();
+    assert_eq!(text.matches("\"rule\": {").count(), 1);
+    let read = EpisodeRecord::from_json(&text, Path::new("e.json")).expect("reads");
+    let kept = record.steps[1].decision.rule;
+    assert!(kept.is_some() && kept != Some(record.config.rule()));
+    assert_eq!([0, 1].map(|at| read.steps[at].decision.rule), [Some(record.config.rule()), kept]);
+}
+
+#[test]
 fn an_action_that_is_not_the_decision_s_is_refused() {
     let mut record = synthetic::record(2);
     record.steps[0].action = record.steps[1].action;

@@ -9,7 +9,7 @@ use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, SweptPush, 
 use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet};
 use crate::made_by::{Build, MadeBy};
-use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
+use crate::plan::{self, Action, Decision, History, Reason, Situation};
 use crate::push::{ArmClearance, Candidate, Counterfactual};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
@@ -148,10 +148,11 @@ impl Episode {
     /// # Errors
     /// [`Error::Usage`] past the budget, for a view that the array does not have, for a push that is no finite motion or
     /// that the arm cannot carry out, and for a push after an object was dropped. The episode is then as it was.
-    pub fn act(&mut self, decision: Decision) -> Result<StepOutcome> {
+    pub fn act(&mut self, mut decision: Decision) -> Result<StepOutcome> {
         if self.is_finished() {
             return Err(Error::Usage(format!("the budget of {} actions is used up", self.record.config.budget)));
         }
+        decision.rule.get_or_insert(self.record.config.rule());
         let seconds = StepSeconds { decide: self.deciding.take(), ..StepSeconds::default() };
         let action = decision.action;
         match action {
@@ -361,10 +362,10 @@ impl Episode {
         self.record.steps.len() >= self.record.config.budget
     }
 
-    /// The voxels that do not count as a gain, where only unseen ones do: those that looks have seen and that no push
-    /// has probably changed since.
-    pub fn seen(&self) -> Option<&VoxelSet> {
-        (self.record.config.planner.counted == Counted::Unseen).then_some(self.sightings.seen())
+    /// The voxels that looks have seen and that no push has probably changed since: where only unseen ones count as a
+    /// gain, these do not.
+    pub fn seen(&self) -> &VoxelSet {
+        self.sightings.seen()
     }
 
     /// The record so far, as `episode.json` keeps it.

@@ -4,7 +4,7 @@ use crate::arm::Motion;
 use crate::belief::{BeliefUpdate, PushPrediction, SweptPush};
 use crate::camera::{Image, MapObservation, NoiseModel};
 use crate::made_by::MadeBy;
-use crate::plan::{Action, Decision, PlannerSettings, PolicyKind};
+use crate::plan::{Action, Decision, PlannerSettings, PolicyKind, Rule};
 use crate::scene::Scene;
 use crate::score::{ObjectVerdict, Scores};
 use crate::world::PushOutcome;
@@ -31,6 +31,13 @@ pub struct EpisodeConfig {
     /// What the camera gets wrong; nothing unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseModel>,
+}
+
+impl EpisodeConfig {
+    /// What its decisions follow.
+    pub fn rule(&self) -> Rule {
+        Rule { policy: self.policy, settings: self.planner }
+    }
 }
 
 /// Wall-clock seconds of one step, by what they went into.

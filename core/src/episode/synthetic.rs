@@ -7,7 +7,7 @@ use crate::arm::Push;
 use crate::belief::{Belief, Classical};
 use crate::camera::ViewId;
 use crate::made_by::{Build, MadeBy};
-use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
+use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason, Rule};
 use crate::push::{Rejection, Stage};
 use crate::rng;
 use crate::scene::{BACKGROUND, CLASS_COUNT, Catalog, Object, Scene, Shelf};
@@ -68,6 +68,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
                 candidates,
                 best_push: Some(0),
                 motion: None,
+                rule: Some(Rule::default()),
             },
             scores: scores(index),
             objects: vec![ObjectVerdict {

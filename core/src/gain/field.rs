@@ -103,11 +103,6 @@ impl GainField {
         Self { layout: self.layout, codes: self.codes.clone(), seen: Some(Arc::new(arrival)) }
     }
 
-    /// Whether it distinguishes seen voxels, as made by [`GainField::with_seen`].
-    pub fn knows_seen(&self) -> bool {
-        self.seen.is_some()
-    }
-
     /// What of a ray's transmittance at a voxel tells something that no earlier view saw.
     #[inline(always)]
     pub(super) fn unseen_share(&self, index: usize, transmittance: f32) -> f32 {

@@ -216,11 +216,6 @@ impl PlannerSettings {
         let mut values = SETTINGS.iter().map(|setting| (setting, setting.value(before), setting.value(self)));
         values.find(|(_, before, now)| before != now)
     }
-
-    /// What `IGM + gamma Reg` of a push has to reach where looking promises `igv`, nats.
-    pub fn asked_of_pushes(&self, igv: f32) -> f32 {
-        (self.patience * igv).max(self.push_floor)
-    }
 }
 
 impl Setting {

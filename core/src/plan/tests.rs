@@ -105,7 +105,7 @@ struct Table {
     update: Box<dyn BeliefUpdate>,
     views: ViewArray,
     arm: ArmTool,
-    seen: Option<VoxelSet>,
+    seen: VoxelSet,
     history: History,
     settings: PlannerSettings,
     seed: u64,
@@ -116,12 +116,13 @@ struct Table {
 
 impl Table {
     fn new() -> Self {
+        let belief = half_seen();
         Self {
-            belief: half_seen(),
+            seen: VoxelSet::empty(&belief.grid),
+            belief,
             update: Box::new(Classical),
             views: views(),
             arm: ArmTool::standard(Shelf::new([0.80, 0.40, 0.40])),
-            seen: None,
             history: History::default(),
             settings: PlannerSettings { candidates: 6, ..PlannerSettings::default() },
             seed: 7,
@@ -155,7 +156,7 @@ impl Table {
             arm: &self.arm,
             unreachable: &[],
             history: &self.history,
-            seen: self.seen.as_ref(),
+            seen: &self.seen,
             budget: BUDGET,
             seed: self.seed,
             really_look: &really_look,
@@ -302,22 +303,22 @@ fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
     let highest = heights.iter().copied().fold(0.0, f32::max);
     assert!(heights.iter().any(|height| *height < highest - 0.05), "views of several heights");
     table.settings = table.settings.counting(Counted::Unseen);
-    table.seen = Some(VoxelSet::empty(&table.belief.grid));
     assert!((best_height(&table) - highest).abs() < 1e-6);
 
     // It is worth it for what it sees past the front: with p = 0.5 everywhere nothing of the back half would be reached.
     let nothing = VoxelSet::empty(&table.belief.grid);
     let view = table.decide(PolicyKind::MemNoPush).pair[0];
-    let share_of_back = |field: &GainField| {
+    let share_of_back = |sources: Vec<(usize, f32)>| {
         let grid = &table.belief.grid;
-        let sources = gain_sources(field, &table.views, view, RayDensity::FULL);
         let behind = |voxel: usize| 2 * usize::from(grid.voxel(voxel).y) >= grid.dims[1];
         let sum = |of: &dyn Fn(usize) -> bool| -> f32 { sources.iter().filter(|s| of(s.0)).map(|s| s.1).sum() };
         sum(&behind) / sum(&|_| true)
     };
-    let (standing, flat) = (gain_field(&table.belief, Some(&nothing)), GainField::new(&table.belief));
-    assert!(share_of_back(&standing) > 0.05, "{}", share_of_back(&standing));
-    assert!(share_of_back(&flat.with_seen(&nothing)) < 0.01);
+    let standing = Gain::new(Counted::Unseen, &table.belief, &nothing);
+    let share = share_of_back(standing.per_voxel(&table.views, view, RayDensity::FULL));
+    assert!(share > 0.05, "{share}");
+    let flat = GainField::new(&table.belief).with_seen(&nothing);
+    assert!(share_of_back(Coverage::new(&flat, &table.views, &[view], RayDensity::FULL).per_voxel(0)) < 0.01);
 }
 
 #[test]
@@ -330,7 +331,7 @@ fn where_only_unseen_voxels_count_each_counts_once() {
     (0..table.belief.grid.voxel_count()).step_by(2).for_each(|voxel| seen.insert(voxel));
     let field = field.with_seen(&seen);
     let coverage = Coverage::new(&field, &table.views, &ids, RayDensity::FULL);
-    table.seen = Some(seen);
+    table.seen = seen;
     let decision = table.decide(PolicyKind::MemNoPush);
     assert_eq!(decision.gains, coverage.gains());
     let offered = |view: &ViewId| !table.history.used_views.contains(view);
@@ -338,7 +339,8 @@ fn where_only_unseen_voxels_count_each_counts_once() {
     assert_eq!(decision.action, Action::Look { view: pair.first });
     assert_eq!(decision.pair, [pair.first, pair.second.expect("a second view")]);
     // What a view's gain comes from is counted alike.
-    let sources = gain_sources(&field, &table.views, pair.first, RayDensity::FULL);
+    let gain = Gain::new(Counted::Unseen, &table.belief, &table.seen);
+    let sources = gain.per_voxel(&table.views, pair.first, RayDensity::FULL);
     let sum: f64 = sources.iter().map(|(_, nats)| f64::from(*nats)).sum();
     assert!((sum / f64::from(pair.first_gain) - 1.0).abs() < 1e-4, "{sum} {}", pair.first_gain);
 }
@@ -370,7 +372,8 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let mut table = Table::after_looks(6);
     table.update = Box::new(Clears);
     table.settings = table.settings.counting(Counted::Unseen);
-    let field = GainField::new(&table.belief);
+    table.seen.insert(0);
+    let field = GainField::new(&table.belief).with_seen(&table.seen);
     let ids: Vec<ViewId> = (0..12).map(ViewId).collect();
     let decision = table.decide(PolicyKind::Mem);
     let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
@@ -378,8 +381,10 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
     let opened =
         Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(std::slice::from_ref(&prediction))[0];
-    let sources = push_sources(Counted::Unseen, &field, &table.views, &ids, &prediction, None);
-    let sum: f32 = sources.iter().map(|(_, nats)| nats).sum();
+    let gain = Gain::new(Counted::Unseen, &table.belief, &table.seen);
+    let sources = gain.push_sources(&table.views, &ids, &prediction, None).expect("it opens something");
+    assert_eq!(sources.words, "what it opens to all views together");
+    let sum: f32 = sources.nats.iter().map(|(_, nats)| nats).sum();
     assert!((sum - opened).abs() < 1e-3 * opened, "what the push opens is told by voxel: {sum}, {opened}");
     assert!(opened > 1.0 && decision.igm == opened, "{opened} {}", decision.igm);
     let best = &decision.candidates[decision.best_push.expect("a push")];
@@ -393,13 +398,42 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Push(best.push)));
 
     // What a push only blurs is worth nothing.
-    table.seen =
-        Some((0..table.belief.grid.voxel_count()).fold(VoxelSet::empty(&table.belief.grid), |mut all, voxel| {
-            all.insert(voxel);
-            all
-        }));
+    (0..table.belief.grid.voxel_count()).for_each(|voxel| table.seen.insert(voxel));
     table.update = Box::new(Prophet::Forgets);
     assert_eq!(table.decide(PolicyKind::Mem).igm, 0.0);
+}
+
+#[test]
+fn where_all_voxels_count_what_was_seen_makes_no_difference() {
+    let mut table = Table::after_looks(6);
+    let before = table.decide(PolicyKind::Mem);
+    (0..table.belief.grid.voxel_count()).for_each(|voxel| table.seen.insert(voxel));
+    assert_eq!(table.decide(PolicyKind::Mem), before);
+    table.settings = table.settings.counting(Counted::Unseen);
+    assert!(table.decide(PolicyKind::Mem).gains.iter().all(|gain| *gain == 0.0));
+}
+
+#[test]
+fn the_push_that_the_planner_holds_to_be_best_stands_on_top_by_whatever_it_is_best() {
+    for (policy, counted) in [
+        (PolicyKind::Mem, Counted::All),
+        (PolicyKind::Mem, Counted::Unseen),
+        (PolicyKind::ClairvoyantPush, Counted::All),
+        (PolicyKind::RandomPush5, Counted::All),
+    ] {
+        let mut table = Table::after_looks(if policy == PolicyKind::RandomPush5 { 4 } else { 6 });
+        table.settings = table.settings.counting(counted);
+        table.update = Box::new(Prophet::Forgets);
+        table.really = vec![[0, 0, 1], [0, 0, 2], [1, 0, 3]];
+        let decision = table.decide(policy);
+        let order = decision.ranked_candidates();
+        assert_eq!(order.first().copied(), decision.best_push, "{policy}, {counted}");
+        assert_eq!(order.len(), decision.candidates.len());
+        let best = |at: &usize| decision.candidates[*at].rejection.is_some();
+        assert!(order.is_sorted_by_key(best), "rejected ones come last");
+        let rule = Rule { policy, settings: table.settings };
+        assert_eq!((decision.rule, decision.comparison().reason), (Some(rule), decision.reason));
+    }
 }
 
 #[test]

@@ -27,15 +27,17 @@ pub(super) fn header(record: &EpisodeRecord) {
 }
 
 pub(super) fn step(step: &StepRecord, budget: usize) {
-    let gain = match step.action {
-        Action::Look { view } => step.decision.gains.get(usize::from(view.0)).copied(),
-        Action::Push(_) => Some(step.decision.igm),
-    };
     let mut action = action_words(step);
     for mishap in mishaps(step) {
         action += &format!(", {mishap}");
     }
-    row(&format!("{}/{budget}", step.index), &action, gain, &step.scores, Some(step.seconds.total()));
+    row(
+        &format!("{}/{budget}", step.index),
+        &action,
+        step.decision.promised(),
+        &step.scores,
+        Some(step.seconds.total()),
+    );
 }
 
 fn row(step: &str, action: &str, gain: Option<f32>, scores: &Scores, seconds: Option<f64>) {

@@ -63,11 +63,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
     egui::ScrollArea::vertical().id_salt("gains").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 4.0;
         let step = model.cursor.min(session.steps()) + 1;
-        heading(
-            ui,
-            format!("Gain of every view before step {step}"),
-            weighed::view_gain(session.record.config.planner.counted),
-        );
+        heading(ui, format!("Gain of every view before step {step}"), decision.counted().of_a_view());
         map.show(ui, &mut touched);
         ui.add_space(6.0);
         let Some(view) = model.view.and_then(|view| session.setup.views.view(view)) else {

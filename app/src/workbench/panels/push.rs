@@ -9,7 +9,6 @@ use super::motion;
 use super::push_review::{self, Review};
 use super::table::Sort;
 use super::textures::{self, Textures};
-use super::weighed;
 use super::{NO_EPISODE, Touched, empty, heading, maps, words};
 use crate::colors::Colormap;
 use crate::picture;
@@ -20,7 +19,7 @@ use crate::workbench::session::{Session, SessionId};
 use nudge_core::arm::Push;
 use nudge_core::belief::{MOST_SURPRISING, PushPrediction};
 use nudge_core::grid::Grid;
-use nudge_core::plan::{Action, CandidateRecord, Decision};
+use nudge_core::plan::{Action, CandidateRecord, DISTURBANCE, Decision};
 use re_viewer::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
 use std::sync::Arc;
 
@@ -56,7 +55,7 @@ impl Default for State {
             textures: Textures::default(),
             outlines: Outlines::default(),
             outlines_after: Outlines::default(),
-            sort: Sort::falling(1),
+            sort: Sort::as_given(),
             rejected: false,
             hovering: false,
             review: None,
@@ -136,12 +135,12 @@ impl Here<'_> {
         heading(ui, title, "Every arrow is the path of the tool's tip; the colour is its value, gain + γ·Reg in nats");
         self.floor(state, ui, decision, touched, ask);
         let State { sort, rejected, .. } = state;
-        let table = decision::push_table(ui, sort, rejected, self.model, self.session, decision, 190.0);
+        let table = decision::push_table(ui, sort, rejected, self.model, decision, 190.0);
         decision::apply_push(table, decision, touched, ask);
         decision::push_button(ui, self.session, self.model, decision, ask);
         ui.add_space(6.0);
         match self.model.candidate.and_then(|at| Some((at, decision.candidates.get(at)?))) {
-            Some((at, candidate)) => self.chosen(state, ui, at, candidate, ask),
+            Some((at, candidate)) => self.chosen(state, ui, decision, at, candidate, ask),
             None => {
                 ui.weak("Click a push to see what it would do");
             }
@@ -176,8 +175,7 @@ impl Here<'_> {
         };
         let width = ui.available_width().min(620.0);
         let drawn = map.show(ui, width);
-        let gamma = self.session.record.config.planner.gamma;
-        let range = value_range(decision, gamma);
+        let range = value_range(decision);
         let arrows: Vec<(usize, &CandidateRecord, [Pos2; 2])> = decision
             .candidates
             .iter()
@@ -193,13 +191,12 @@ impl Here<'_> {
         };
         let painter = ui.painter_at(drawn.response.rect);
         // The rejected below, the best on top.
-        let mut order: Vec<&(usize, &CandidateRecord, [Pos2; 2])> = arrows.iter().collect();
-        let rank = |candidate: &CandidateRecord| weighed::value(candidate, gamma).unwrap_or(f32::NEG_INFINITY);
-        order.sort_by(|a, b| rank(a.1).total_cmp(&rank(b.1)));
-        let pushed = weighed::pushed(decision);
+        let ranked = decision.ranked_candidates();
+        let order = ranked.iter().rev().filter_map(|at| arrows.iter().find(|arrow| arrow.0 == *at));
+        let pushed = decision.pushed();
         for (at, candidate, ends) in order {
             let picked = self.model.candidate == Some(*at) || over == Some(*at) || hovered == Some(candidate.push);
-            let look = match weighed::value(candidate, gamma) {
+            let look = match decision.value_of(candidate) {
                 _ if candidate.rejection.is_some() => Look::Rejected,
                 Some(value) => Look::Weighed(legend::ink(Colormap::Cividis.of(value, range))),
                 None => Look::Weighed(Color32::WHITE),
@@ -212,14 +209,14 @@ impl Here<'_> {
         }
         if let Some((at, candidate)) = over.and_then(|at| Some((at, decision.candidates.get(at)?))) {
             touched.over = Some(Hovered::Push(candidate.push));
-            let text = describe(at, candidate, gamma);
+            let text = describe(at, decision, candidate);
             Tooltip::for_widget(&drawn.response).at_pointer().gap(12.0).show(|ui| ui.label(text));
             if drawn.response.clicked() {
                 touched.candidate = Some(at);
                 ask.push(Command::Preview(candidate.push));
             }
         }
-        if decision.candidates.iter().all(|candidate| weighed::value(candidate, gamma).is_none()) {
+        if decision.candidates.iter().all(|candidate| decision.value_of(candidate).is_none()) {
             ui.label(RichText::new("white: not weighed, this policy pushes at random").small().weak());
         } else {
             ui.scope(|ui| {
@@ -234,8 +231,15 @@ impl Here<'_> {
     }
 
     /// What a push would do: now, predicted, the change, and what happened if it was done.
-    fn chosen(&self, state: &mut State, ui: &mut Ui, at: usize, candidate: &CandidateRecord, ask: &mut Vec<Command>) {
-        let gamma = self.session.record.config.planner.gamma;
+    fn chosen(
+        &self,
+        state: &mut State,
+        ui: &mut Ui,
+        decision: &Decision,
+        at: usize,
+        candidate: &CandidateRecord,
+        ask: &mut Vec<Command>,
+    ) {
         heading(ui, format!("Push {at}"), "The push that is looked at; click another one in the table or on the map");
         let nats = |value: Option<f32>| value.map_or("not weighed".to_owned(), words::nats);
         let [x, y, _] = candidate.push.start;
@@ -243,9 +247,9 @@ impl Here<'_> {
         let view = candidate.view.map_or("n/a".to_owned(), |view| view.0.to_string());
         let place = format!("x {}, y {} m", words::metres(x), words::metres(y));
         let facts = [
-            fact("value", nats(weighed::value(candidate, gamma)), "Gain + γ·Reg"),
-            fact("gain", nats(candidate.gain), weighed::push_gain(self.session.record.config.planner.counted)),
-            fact("γ·Reg", nats(candidate.reg.map(|reg| gamma * reg)), weighed::DISTURBANCE),
+            fact("value", nats(decision.value_of(candidate)), "Gain + γ·Reg"),
+            fact("gain", nats(candidate.gain), decision.counted().of_a_push()),
+            fact("γ·Reg", nats(decision.disturbance_of(candidate)), DISTURBANCE),
             fact("best view", view, "The view with the largest gain under the predicted belief"),
             fact("from", place, "Where the tip starts"),
             fact("length", way.replace('-', "−"), "Planned length and direction; 90° is into the shelf"),
@@ -419,8 +423,8 @@ impl Here<'_> {
 }
 
 /// From the least to the largest value of the feasible candidates.
-fn value_range(decision: &Decision, gamma: f32) -> [f32; 2] {
-    let values = decision.candidates.iter().filter_map(|candidate| weighed::value(candidate, gamma));
+fn value_range(decision: &Decision) -> [f32; 2] {
+    let values = decision.candidates.iter().filter_map(|candidate| decision.value_of(candidate));
     let [low, high] =
         values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
     if low <= high { [low, high] } else { [0.0, 0.0] }
@@ -433,13 +437,13 @@ fn change_at(prediction: &PushPrediction, grid: &Grid, cell: usize) -> f32 {
 }
 
 /// A candidate in words, for the tooltip.
-fn describe(at: usize, candidate: &CandidateRecord, gamma: f32) -> String {
-    match (&candidate.rejection, weighed::value(candidate, gamma)) {
+fn describe(at: usize, decision: &Decision, candidate: &CandidateRecord) -> String {
+    match (&candidate.rejection, decision.value_of(candidate)) {
         (Some(rejection), _) => format!("Push {at}, rejected: {}", rejection),
         (None, None) => format!("Push {at}: not weighed"),
         (None, Some(value)) => {
             let gain = words::nats(candidate.gain.unwrap_or(0.0));
-            let reg = words::nats(gamma * candidate.reg.unwrap_or(0.0));
+            let reg = words::nats(decision.disturbance_of(candidate).unwrap_or(0.0));
             format!("Push {at}: {}\ngain {gain}, γ·Reg {reg}", words::nats(value))
         }
     }

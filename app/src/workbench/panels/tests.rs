@@ -327,7 +327,7 @@ fn a_push_is_predicted_and_then_judged() {
     assert!(asked(&harness, |command| matches!(command, Command::Preview(_)).then_some(())).is_some());
     let model = &mut harness.state_mut().model;
     let decision = model.sessions[0].moments[4].decision().expect("step 4").clone();
-    model.candidate = weighed::pushed(&decision);
+    model.candidate = decision.pushed();
     fixture::answer(model);
     harness.run_steps(2);
     for title in ["Now", "Predicted", "Change", "What happened"] {

@@ -4,7 +4,7 @@ use super::table::{Cell, Column, Row};
 use super::words;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::EpisodeRecord;
-use nudge_core::plan::{Action, CandidateRecord, Counted, Decision};
+use nudge_core::plan::{Action, Counted, DISTURBANCE, Decision, ranked};
 use std::collections::BTreeSet;
 
 /// How many views and pushes the tables list.
@@ -24,18 +24,9 @@ pub fn used_views(record: &EpisodeRecord, step: usize) -> BTreeSet<ViewId> {
     used
 }
 
-/// What a candidate is worth, nats: `gain + gamma Reg`; `None` if it was rejected or not weighed.
-pub fn value(candidate: &CandidateRecord, gamma: f32) -> Option<f32> {
-    let value = candidate.gain? + gamma * candidate.reg.unwrap_or(0.0);
-    value.is_finite().then_some(value)
-}
-
-/// Positions in the order of falling values; what is no number comes last.
-fn falling(values: impl Iterator<Item = Option<f32>>) -> Vec<usize> {
-    let of = |value: Option<f32>| value.filter(|value| value.is_finite()).unwrap_or(f32::NEG_INFINITY);
-    let mut order: Vec<(usize, f32)> = values.map(of).enumerate().collect();
-    order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    order.into_iter().map(|(at, _)| at).collect()
+/// Views in the order of falling gain; what is no number comes last.
+fn falling(gains: &[f32]) -> Vec<usize> {
+    ranked(None, gains.iter().map(|gain| gain.is_finite().then_some(*gain)))
 }
 
 /// The best gain of all views, nats.
@@ -51,48 +42,16 @@ pub fn looked_from(decision: &Decision) -> Option<ViewId> {
     }
 }
 
-/// The candidate that a decision pushes.
-pub fn pushed(decision: &Decision) -> Option<usize> {
-    match decision.action {
-        Action::Look { .. } => None,
-        Action::Push(push) => decision.candidates.iter().position(|candidate| candidate.push == push),
-    }
-}
-
 /// The candidate that is looked at unless another one is chosen: the one that is pushed, else the best one.
 pub fn looked_at_first(decision: &Decision) -> Option<usize> {
-    pushed(decision).or(decision.best_push).filter(|at| *at < decision.candidates.len())
-}
-
-/// What a view's gain is, with the formula that applies.
-pub fn view_gain(counted: Counted) -> &'static str {
-    match counted {
-        Counted::All => {
-            "Information gain of the view, nats: IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), summed over rays"
-        }
-        Counted::Unseen => {
-            "Coverage of the view, nats: IG(v) = Σ voxels H(p)·max over rays Π(1 − p before); every voxel that no look has \
-             seen counts once, however many rays meet it"
-        }
-    }
-}
-
-/// What a push's gain is, with the formula that applies.
-pub fn push_gain(counted: Counted) -> &'static str {
-    match counted {
-        Counted::All => "Gain of the best single view under the predicted belief, nats: max over views of IG(v)",
-        Counted::Unseen => {
-            "What the push opens, nats: Σ voxels H(p predicted) that a ray of some view reaches after it and none before, of \
-             those that no look has seen"
-        }
-    }
+    decision.pushed().or(decision.best_push).filter(|at| *at < decision.candidates.len())
 }
 
 /// Columns of [`view_rows`].
 pub fn view_columns(counted: Counted) -> [Column; 5] {
     [
         Column { title: "View", hint: "Number of the view in its array", width: 34.0 },
-        Column { title: "Gain", hint: view_gain(counted), width: 52.0 },
+        Column { title: "Gain", hint: counted.of_a_view(), width: 52.0 },
         Column { title: "Of best", hint: "Share of the best view's gain", width: 46.0 },
         Column { title: "Camera at", hint: "Column, row and look-at target in the array, counted from 1", width: 62.0 },
         Column {
@@ -112,7 +71,7 @@ pub fn view_rows(
 ) -> Vec<Row> {
     let best = best_gain(decision);
     let looked = looked_from(decision);
-    let order = falling(decision.gains.iter().map(|gain| Some(*gain)));
+    let order = falling(&decision.gains);
     let row = |at: usize| {
         let (id, gain) = (ViewId(at as u16), decision.gains[at]);
         let note = match decision.pair.iter().position(|view| *view == id) {
@@ -150,17 +109,13 @@ pub fn push_columns(counted: Counted) -> [Column; 7] {
     [
         Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
         Column { title: "Value", hint: "Gain + γ·Reg, nats: what is compared with looking", width: 50.0 },
-        Column { title: "Gain", hint: push_gain(counted), width: 50.0 },
+        Column { title: "Gain", hint: counted.of_a_push(), width: 50.0 },
         Column { title: "γ·Reg", hint: DISTURBANCE, width: 42.0 },
         Column { title: "To", hint: "Direction, degrees; 90 is into the shelf, 0 to the right", width: 34.0 },
         Column { title: "mm", hint: "Planned length of the push, millimetres", width: 30.0 },
         Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 },
     ]
 }
-
-/// What `γ·Reg` is.
-pub const DISTURBANCE: &str = "What the push makes uncertain of the classes, nats, at most 0: γ times Reg = min(0, H(classes now) − H(classes \
-     predicted)), H the entropy of the semantic map";
 
 /// Which candidates a table lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -171,12 +126,11 @@ pub enum Listed {
     All,
 }
 
-/// Push candidates of a decision, the best first.
-pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Option<usize>) -> Vec<Row> {
-    let pushed = pushed(decision);
+/// Push candidates of a decision, as the planner ranks them.
+pub fn push_rows(decision: &Decision, listed: Listed, selected: Option<usize>) -> Vec<Row> {
+    let pushed = decision.pushed();
     let candidates = &decision.candidates;
-    let mut order = falling(candidates.iter().map(|candidate| value(candidate, gamma)));
-    order.sort_by_key(|at| candidates[*at].rejection.is_some());
+    let mut order = decision.ranked_candidates();
     if listed == Listed::Best {
         order.retain(|at| candidates[*at].rejection.is_none());
         order.truncate(LISTED);
@@ -192,7 +146,7 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
         };
         let place = format!("From x {}, y {} m", words::metres(push.start[0]), words::metres(push.start[1]));
         let view = candidate.view.map_or_else(String::new, |view| format!("; best seen from view {}", view.0));
-        let name = match (&candidate.rejection, value(candidate, gamma)) {
+        let name = match (&candidate.rejection, decision.value_of(candidate)) {
             (Some(rejection), _) => format!("Push {at}, rejected: {}", rejection),
             (None, Some(value)) => format!("Push {at}, value {}", words::nats(value)),
             (None, None) => format!("Push {at}, not weighed"),
@@ -201,9 +155,9 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
             key: at,
             cells: vec![
                 Cell::number(at),
-                Cell::nats(value(candidate, gamma)),
+                Cell::nats(decision.value_of(candidate)),
                 Cell::nats(candidate.gain),
-                Cell::nats(candidate.reg.map(|reg| gamma * reg)),
+                Cell::nats(decision.disturbance_of(candidate)),
                 Cell::Figure(f64::from(push.direction_deg), format!("{:.0}°", push.direction_deg).replace('-', "−")),
                 Cell::Figure(f64::from(push.length_m), format!("{:.0}", push.length_m * 1e3)),
                 Cell::Word(note),
@@ -221,15 +175,20 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::workbench::fixture;
 
     #[test]
-    fn a_gain_by_coverage_is_not_explained_as_a_sum_over_rays() {
-        let gain = |counted| view_columns(counted)[1].hint;
-        assert!(gain(Counted::All).contains("Σ rays Σ voxels"), "{}", gain(Counted::All));
-        let coverage = gain(Counted::Unseen);
-        assert!(coverage.contains("max over rays") && !coverage.contains("Σ rays"), "{coverage}");
-        let push = |counted| push_columns(counted)[2].hint;
-        assert!(push(Counted::All).contains("best single view"), "{}", push(Counted::All));
-        assert!(push(Counted::Unseen).contains("opens") && !push(Counted::Unseen).contains("best single view"));
+    fn the_best_push_stands_on_top_of_the_table_though_another_one_has_a_larger_value() {
+        let mut decision = fixture::session(1).moments[4].decision().expect("step 4").clone();
+        let feasible: Vec<usize> =
+            (0..decision.candidates.len()).filter(|at| decision.candidates[*at].rejection.is_none()).collect();
+        let [.., other, best] = feasible[..] else { panic!("two feasible pushes") };
+        (decision.candidates[other].gain, decision.candidates[other].reg) = (Some(1e6), Some(0.0));
+        decision.best_push = Some(best);
+        for listed in [Listed::Best, Listed::All] {
+            let rows = push_rows(&decision, listed, None);
+            assert_eq!([rows[0].key, rows[1].key], [best, other]);
+        }
+        assert_eq!(push_rows(&decision, Listed::All, None).len(), decision.candidates.len());
     }
 }

@@ -102,7 +102,7 @@ pub(super) fn no_arrows() -> rerun::Arrows3D {
 
 /// The candidates as arrows, in the colours of what they are worth by the episode's own weight of the disturbance.
 fn candidates(side: &Side) -> rerun::Arrows3D {
-    side.decision.as_ref().map_or_else(no_arrows, |decision| shapes::candidates(decision, side.gamma))
+    side.decision.as_ref().map_or_else(no_arrows, |decision| shapes::candidates(decision))
 }
 
 /// The push that a moment's step did.
@@ -150,16 +150,19 @@ mod tests {
     #[test]
     fn push_arrows_have_the_colours_of_the_episodes_own_gamma() {
         let mut session = fixture::session(1);
-        session.record.config.planner.gamma = 3.0;
         let mut decision = session.moments[4].decision().expect("step 4").clone();
         // Two that are weighed the other way round by another weight.
         for (candidate, (gain, reg)) in decision.candidates.iter_mut().zip([(100.0, -60.0), (50.0, 0.0)]) {
             (candidate.gain, candidate.reg, candidate.rejection) = (Some(gain), Some(reg), None);
         }
-        session.pending = Some(Arc::new(decision.clone()));
-        let side = Side::of(&session, session.steps());
-        assert_ne!(shapes::candidates(&decision, 3.0), shapes::candidates(&decision, GAMMA), "the weight matters here");
-        assert_eq!(candidates(&side), shapes::candidates(&decision, 3.0));
+        let mut by = |gamma: f32| {
+            decision.rule.as_mut().expect("of an episode").settings.gamma = gamma;
+            decision.clone()
+        };
+        let (own, other) = (by(3.0), by(GAMMA));
+        assert_ne!(shapes::candidates(&own), shapes::candidates(&other), "the weight matters here");
+        session.pending = Some(Arc::new(own.clone()));
+        assert_eq!(candidates(&Side::of(&session, session.steps())), shapes::candidates(&own));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use super::{Show, Stage};
 use crate::workbench::fixture::{self, Script};
 use crate::workbench::model::{LayoutKind, Model, Picked};
-use crate::workbench::panels::{self, camera, compare, curves, decision, episode, gains, maps, push, weighed, why};
+use crate::workbench::panels::{self, camera, compare, curves, decision, episode, gains, maps, push, why};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use nudge_core::camera::ViewId;
@@ -115,6 +115,6 @@ fn prepare(model: &mut Model, name: &str, cursor: usize) {
     };
     let decision = session.decision_after(cursor);
     model.view = decision.and_then(|decision| decision.pair.first().copied()).or(Some(ViewId(140)));
-    model.candidate = decision.and_then(|decision| weighed::pushed(decision).or(decision.best_push));
+    model.candidate = decision.and_then(|decision| decision.pushed().or(decision.best_push));
     fixture::answer(model);
 }

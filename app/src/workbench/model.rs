@@ -4,7 +4,6 @@
 use super::author::Author;
 use super::browser::Browser;
 use super::derive::Derived;
-use super::panels;
 use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
 use crate::driver::default_belief;
@@ -140,6 +139,27 @@ pub enum Hovered {
     View(ViewId),
     /// A push candidate.
     Push(Push),
+}
+
+/// How far a person has moved the arm along its motion: of which step, and to which time, seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scrubbed(Option<((SessionId, usize), f64)>);
+
+impl Scrubbed {
+    /// The time in the motion of a step, seconds; `None` where nobody moves the arm along it.
+    pub fn at_s(&self, step: (SessionId, usize)) -> Option<f64> {
+        self.0.filter(|(of, _)| *of == step).map(|(_, at_s)| at_s)
+    }
+
+    /// Moves the arm to a time in the motion of a step, seconds.
+    pub fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
+        self.0 = Some((step, at_s));
+    }
+
+    /// Shows the step without the arm again.
+    pub fn hide(&mut self) {
+        self.0 = None;
+    }
 }
 
 /// With what an episode is started.
@@ -285,8 +305,8 @@ pub struct Model {
     pub browser: Browser,
     /// Messages that fade.
     pub toasts: Toasts,
-    /// What the panels remember from frame to frame.
-    pub panels: panels::State,
+    /// How far the arm is moved along its motion.
+    pub scrubbed: Scrubbed,
 }
 
 impl Model {

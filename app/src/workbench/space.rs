@@ -5,13 +5,15 @@
 //! last one, and remembers which voxel every drawn instance is, for picking.
 
 mod arm;
+pub mod at;
+mod layout;
 mod push;
 mod voxels;
 
 use super::half_belief::HalfBelief;
 use super::model::{ColourBy, Display, GainSource, Hovered, LayoutKind, Picked, Preview};
 use super::session::{Moment, Session, SessionId, Setup};
-use super::{space_layout, viewer};
+use super::viewer;
 use crate::colors::{self, Colormap, Rgb};
 use crate::record::layout::Ground;
 use crate::record::shapes;
@@ -28,54 +30,6 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use voxels::{Voxels, voxel_key};
 
-/// Entities of the window's recording.
-pub mod at {
-    /// The panels of the shelf.
-    pub const SHELF: &str = "shelf/panels";
-    /// Its edges.
-    pub const EDGES: &str = "shelf/edges";
-    /// The true objects as glass.
-    pub const OBJECTS: &str = "objects";
-    /// The belief of the shown episode.
-    pub const BELIEF: &str = "belief";
-    /// The candidate views.
-    pub const VIEWS: &str = "camera/views";
-    /// The view that was looked from last.
-    pub const CURRENT: &str = "camera/current";
-    /// The push candidates.
-    pub const CANDIDATES: &str = "push/candidates";
-    /// The push that was done or is looked at.
-    pub const CHOSEN: &str = "push/chosen";
-    /// What it sweeps.
-    pub const SWEPT: &str = "push/swept";
-    /// The belief that it is predicted to leave.
-    pub const PREDICTED: &str = "push/predicted";
-    /// How that differs from now.
-    pub const DIFFERENCE: &str = "push/difference";
-    /// What it really left.
-    pub const HAPPENED: &str = "push/happened";
-    /// Why there is nothing of it to show.
-    pub const HAPPENED_NOTE: &str = "push/happened/note";
-    /// The arm.
-    pub const ARM: &str = "robot/arm";
-    /// The way of its tip.
-    pub const ARM_PATH: &str = "robot/path";
-    /// Where a gain comes from.
-    pub const GAIN: &str = "gain";
-    /// The belief of the second episode.
-    pub const OTHER: &str = "other/belief";
-    /// Its true objects.
-    pub const OTHER_OBJECTS: &str = "other/objects";
-    /// How the two beliefs differ.
-    pub const BETWEEN: &str = "between";
-    /// What the pointer is over.
-    pub const HOVERED: &str = "pointer/hovered";
-    /// What is asked about.
-    pub const PICKED: &str = "pointer/picked";
-}
-
-/// Probability changes smaller than this are not drawn.
-const CHANGED: f32 = 0.05;
 /// Drawn instances of one entity at most, so that the window stays quick.
 const MOST_VOXELS: usize = 200_000;
 
@@ -206,7 +160,7 @@ impl Painter {
     /// Logs what differs from the last call.
     pub fn paint(&mut self, space: &Space) {
         let ground = if space.light { Ground::Light } else { Ground::Dark };
-        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect, ground, space.shows_arm())
+        if let Some((views, distance, layout)) = layout::of(space.layout, space.aspect, ground, space.shows_arm())
             && self.layout.replace((views, distance, ground, space.shows_arm()))
                 != Some((views, distance, ground, space.shows_arm()))
             && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
@@ -268,7 +222,7 @@ impl Painter {
             self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
         }
         for entity in [at::CANDIDATES, at::CHOSEN] {
-            self.log(entity, &push::no_arrows());
+            self.log(entity, &no_arrows());
         }
         self.log(at::HAPPENED_NOTE, &rerun::Points3D::new(Vec::<[f32; 3]>::new()));
         for entity in [at::SHELF, at::OBJECTS, at::OTHER_OBJECTS, at::ARM] {
@@ -461,6 +415,10 @@ impl Facets {
             .with_triangle_indices(triangles)
             .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, alpha))
     }
+}
+
+fn no_arrows() -> rerun::Arrows3D {
+    rerun::Arrows3D::from_vectors(Vec::<[f32; 3]>::new())
 }
 
 /// A mesh that cannot be seen.

@@ -1,9 +1,9 @@
 //! Which three-dimensional views every layout has.
 
-use super::model::LayoutKind;
-use super::space::at;
+use super::at;
 use crate::record::blueprint::{Layout, Part};
 use crate::record::layout::{Eye, Ground, spatial};
+use crate::workbench::model::LayoutKind;
 
 /// Width over height from which on a view shows the whole shelf with the eye where it is by default.
 const WHOLE_SHELF: f32 = 1.05;
@@ -19,7 +19,7 @@ fn distance(aspect: f32) -> f32 {
 /// The views of a layout with the first layout that has the same ones, and the distance of their eyes; `None` where it
 /// has none. `aspect` is width over height of the place for all of them together. With the robot in them they are seen
 /// from beside it, or it would stand in the way.
-pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -> Option<(LayoutKind, f32, Layout)> {
+pub(super) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -> Option<(LayoutKind, f32, Layout)> {
     let distance = distance(match layout {
         LayoutKind::Compare => aspect / 3.0,
         _ => aspect,

@@ -10,6 +10,8 @@ use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 mod clairvoyant;
+mod policies;
+mod unseen;
 
 const BUDGET: usize = 20;
 
@@ -291,118 +293,6 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
 }
 
 #[test]
-fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
-    let mut table = Table::new();
-    table.belief = Belief::uniform(table.belief.grid);
-    let best_height = |table: &Table| {
-        let Action::Look { view } = table.decide(PolicyKind::MemNoPush).action else { panic!("a look") };
-        table.views.view(view).expect("a view").position().z
-    };
-    let heights: Vec<f32> = table.views.views.iter().map(|view| view.position().z).collect();
-    let highest = heights.iter().copied().fold(0.0, f32::max);
-    assert!(heights.iter().any(|height| *height < highest - 0.05), "views of several heights");
-    table.settings = table.settings.counting(Counted::Unseen);
-    table.seen = Some(VoxelSet::empty(&table.belief.grid));
-    assert!((best_height(&table) - highest).abs() < 1e-6);
-
-    // It is worth it for what it sees past the front: with p = 0.5 everywhere nothing of the back half would be reached.
-    let nothing = VoxelSet::empty(&table.belief.grid);
-    let view = table.decide(PolicyKind::MemNoPush).pair[0];
-    let share_of_back = |field: &GainField| {
-        let grid = &table.belief.grid;
-        let sources = gain_sources(field, &table.views, view, RayDensity::FULL);
-        let behind = |voxel: usize| 2 * usize::from(grid.voxel(voxel).y) >= grid.dims[1];
-        let sum = |of: &dyn Fn(usize) -> bool| -> f32 { sources.iter().filter(|s| of(s.0)).map(|s| s.1).sum() };
-        sum(&behind) / sum(&|_| true)
-    };
-    let (standing, flat) = (gain_field(&table.belief, Some(&nothing)), GainField::new(&table.belief));
-    assert!(share_of_back(&standing) > 0.05, "{}", share_of_back(&standing));
-    assert!(share_of_back(&flat.with_seen(&nothing)) < 0.01);
-}
-
-#[test]
-fn where_only_unseen_voxels_count_each_counts_once() {
-    let mut table = Table::after_looks(1);
-    table.settings = table.settings.counting(Counted::Unseen);
-    let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
-    let field = GainField::new(&table.belief);
-    let mut seen = VoxelSet::empty(&table.belief.grid);
-    (0..table.belief.grid.voxel_count()).step_by(2).for_each(|voxel| seen.insert(voxel));
-    let field = field.with_seen(&seen);
-    let coverage = Coverage::new(&field, &table.views, &ids, RayDensity::FULL);
-    table.seen = Some(seen);
-    let decision = table.decide(PolicyKind::MemNoPush);
-    assert_eq!(decision.gains, coverage.gains());
-    let offered = |view: &ViewId| !table.history.used_views.contains(view);
-    let pair = coverage.best_pair(&decision.gains, offered).expect("a pair");
-    assert_eq!(decision.action, Action::Look { view: pair.first });
-    assert_eq!(decision.pair, [pair.first, pair.second.expect("a second view")]);
-    // What a view's gain comes from is counted alike.
-    let sources = gain_sources(&field, &table.views, pair.first, RayDensity::FULL);
-    let sum: f64 = sources.iter().map(|(_, nats)| f64::from(*nats)).sum();
-    assert!((sum / f64::from(pair.first_gain) - 1.0).abs() < 1e-4, "{sum} {}", pair.first_gain);
-}
-
-#[test]
-fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
-    // The boxes leave; what stood behind them is as unknown as before.
-    struct Clears;
-    impl BeliefUpdate for Clears {
-        fn name(&self) -> &str {
-            "clears"
-        }
-
-        fn observe(&self, belief: &Belief, _: &MapObservation) -> Belief {
-            belief.clone()
-        }
-
-        fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
-            let cleared = |a: &[f32; 2]| if a[0] > a[1] { [1.0, 100.0] } else { *a };
-            let prediction = PushPrediction {
-                window: Window::whole(&belief.grid),
-                occupancy: belief.occupancy.iter().map(cleared).collect(),
-                semantics: belief.semantics.clone(),
-                change: vec![1.0; belief.grid.cell_count()],
-            };
-            vec![prediction; pushes.len()]
-        }
-    }
-    let mut table = Table::after_looks(6);
-    table.update = Box::new(Clears);
-    table.settings = table.settings.counting(Counted::Unseen);
-    let field = GainField::new(&table.belief);
-    let ids: Vec<ViewId> = (0..12).map(ViewId).collect();
-    let decision = table.decide(PolicyKind::Mem);
-    let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
-    assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
-    let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
-    let opened =
-        Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(std::slice::from_ref(&prediction))[0];
-    let sources = push_sources(Counted::Unseen, &field, &table.views, &ids, &prediction, None);
-    let sum: f32 = sources.iter().map(|(_, nats)| nats).sum();
-    assert!((sum - opened).abs() < 1e-3 * opened, "what the push opens is told by voxel: {sum}, {opened}");
-    assert!(opened > 1.0 && decision.igm == opened, "{opened} {}", decision.igm);
-    let best = &decision.candidates[decision.best_push.expect("a push")];
-    assert!(best.gain == Some(opened) && best.view.is_some());
-
-    // It pushes once looking has less to tell than the push, by far.
-    assert_eq!(decision.reason, Reason::LookTellsMore);
-    table.settings.patience = 0.9 * decision.igm / decision.igv;
-    table.settings.push_floor = 0.0;
-    let decision = table.decide(PolicyKind::Mem);
-    assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Push(best.push)));
-
-    // What a push only blurs is worth nothing.
-    table.seen =
-        Some((0..table.belief.grid.voxel_count()).fold(VoxelSet::empty(&table.belief.grid), |mut all, voxel| {
-            all.insert(voxel);
-            all
-        }));
-    table.update = Box::new(Prophet::Forgets);
-    assert_eq!(table.decide(PolicyKind::Mem).igm, 0.0);
-}
-
-#[test]
 fn mem_looks_where_a_push_would_tell_nothing() {
     let mut table = Table::after_looks(6);
     table.update = Box::new(Prophet::Knows);
@@ -451,81 +341,6 @@ fn mem_looks_when_no_push_is_feasible() {
     let decision = table.decide(PolicyKind::Mem);
     assert_eq!(decision.reason, Reason::NoCandidate);
     assert!(!is_push(&decision) && decision.best_push.is_none());
-}
-
-#[test]
-fn a_policy_that_never_pushes_never_does() {
-    for policy in [PolicyKind::MemNoPush, PolicyKind::Random, PolicyKind::RandomCnabu] {
-        let mut table = Table::new();
-        table.update = Box::new(Prophet::Forgets);
-        let decisions = table.run(policy, 11);
-        assert!(decisions.iter().all(|d| !is_push(d) && d.reason == Reason::Schedule && d.candidates.is_empty()));
-        let mut seen = table.history.used_views.clone();
-        seen.sort();
-        seen.dedup();
-        assert_eq!(seen.len(), 11, "{policy}: no view twice");
-    }
-}
-
-#[test]
-fn random_views_follow_the_seed() {
-    let run = |policy, seed| {
-        let mut table = Table { seed, ..Table::new() };
-        table.run(policy, 8);
-        table.history.used_views
-    };
-    assert_eq!(run(PolicyKind::Random, 1), run(PolicyKind::Random, 1));
-    assert_eq!(run(PolicyKind::Random, 1), run(PolicyKind::RandomCnabu, 1), "they differ in the belief alone");
-    assert_ne!(run(PolicyKind::Random, 1), run(PolicyKind::Random, 2));
-    assert_ne!(run(PolicyKind::Random, 1), run(PolicyKind::MemNoPush, 1));
-}
-
-#[test]
-fn scheduled_policies_push_every_fifth_step_but_not_in_the_last() {
-    for policy in [PolicyKind::RandomPush5, PolicyKind::RandomPush5Blind, PolicyKind::RandomViewPush5] {
-        let mut table = Table::new();
-        let decisions = table.run(policy, BUDGET);
-        assert_eq!(pushes_at(&decisions), [5, 10, 15], "{policy}");
-        assert_eq!(decisions[BUDGET - 1].reason, Reason::LastStep);
-        assert!(decisions[..BUDGET - 1].iter().all(|d| d.reason == Reason::Schedule));
-        let pushed = &decisions[4];
-        let chosen = &pushed.candidates[pushed.best_push.expect("the push")];
-        assert_eq!((chosen.rejection.as_ref(), chosen.gain, pushed.igm), (None, None, 0.0));
-        let by_gain = decisions[5].action == Action::Look { view: decisions[5].pair[0] };
-        assert!(by_gain || policy == PolicyKind::RandomViewPush5, "{policy}");
-    }
-    let mut dropped = Table::after_looks(4);
-    dropped.history.dropped = true;
-    assert_eq!(dropped.decide(PolicyKind::RandomPush5).reason, Reason::Dropped);
-    let mut bare = Table::after_looks(4);
-    bare.belief = Belief::uniform(bare.belief.grid);
-    assert_eq!(bare.decide(PolicyKind::RandomPush5).reason, Reason::NoCandidate);
-}
-
-#[test]
-fn saturation_pushes_when_two_gains_in_a_row_are_alike() {
-    let mut table = Table::after_looks(6);
-    let gain = table.decide(PolicyKind::Saturation).best_gain().expect("a gain");
-    let mut with = |previous: f32, steps: usize| {
-        table.history.actions = vec![Action::Look { view: ViewId(0) }; steps];
-        table.history.best_gains = vec![1e9, previous];
-        let decision = table.decide(PolicyKind::Saturation);
-        (is_push(&decision), decision.reason)
-    };
-    assert_eq!(with(gain * 1.01, 6), (true, Reason::Schedule));
-    assert_eq!(with(gain * 1.05, 6), (false, Reason::Schedule));
-    assert_eq!(with(gain * 1.01, 2), (false, Reason::TooEarly));
-    assert_eq!(with(gain * 1.01, BUDGET - 1), (false, Reason::LastStep));
-    assert!(!is_push(&Table::after_looks(6).decide(PolicyKind::Saturation)), "no gain to compare with");
-}
-
-#[test]
-fn the_oracle_takes_the_view_that_really_tells_most() {
-    let mut table = Table::new();
-    let first = table.decide(PolicyKind::Oracle);
-    assert_eq!((first.action, first.reason), (Action::Look { view: ViewId(9) }, Reason::Schedule));
-    table.history.record(&first, false);
-    assert_eq!(table.decide(PolicyKind::Oracle).action, Action::Look { view: ViewId(11) });
 }
 
 #[test]

@@ -18,6 +18,7 @@ pub mod graphics;
 pub mod half_belief;
 mod icon;
 pub mod latest;
+pub mod layout_kind;
 pub mod menu;
 pub mod model;
 pub mod panels;

@@ -4,6 +4,7 @@
 use super::author::Author;
 use super::browser::Browser;
 use super::derive::Derived;
+pub use super::layout_kind::LayoutKind;
 use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
 use crate::driver::default_belief;
@@ -15,41 +16,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// The layouts, as the tabs at the top right name them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum LayoutKind {
-    /// Belief, maps, curves and decision.
-    #[default]
-    Episode,
-    /// The numbers and causes of one voxel or cell.
-    Why,
-    /// The gain of every view.
-    Gains,
-    /// What pushes would do.
-    Push,
-    /// Two episodes on one clock.
-    Compare,
-    /// A scene in the making.
-    Author,
-}
-
-impl LayoutKind {
-    /// All of them, in the order of the tabs.
-    pub const ALL: [Self; 6] = [Self::Episode, Self::Why, Self::Gains, Self::Push, Self::Compare, Self::Author];
-
-    /// The tab's text.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Episode => "Episode",
-            Self::Why => "Why",
-            Self::Gains => "Gains",
-            Self::Push => "Push",
-            Self::Compare => "Compare",
-            Self::Author => "Author",
-        }
-    }
-}
 
 /// What the colour of a drawn voxel says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

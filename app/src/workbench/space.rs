@@ -177,7 +177,7 @@ impl Painter {
         if space.layout == LayoutKind::Push {
             self.push_views(side, space);
         }
-        if space.layout == LayoutKind::Gains {
+        if space.layout.shows_gain() {
             self.gain(side, space);
         }
         if space.layout == LayoutKind::Compare {
@@ -275,7 +275,7 @@ impl Painter {
     }
 
     fn cameras(&mut self, side: &Side, space: &Space) {
-        let shown = space.display.views || space.layout == LayoutKind::Gains;
+        let shown = space.display.views || space.layout.shows_gain();
         let gains = side.decision.as_ref().map(|decision| &decision.gains);
         if self.differs(at::VIEWS, format!("{shown} {:?} {}", side.key(), gains.is_some())) {
             let views = &side.setup.views;

@@ -29,7 +29,7 @@
 
 mod raw_mesh;
 
-use super::lines::Places;
+use super::lines::{Places, name_object};
 use super::mesh::{Unit, load_mesh};
 use super::{Catalog, MeshShape, Object, RobotFile, RobotPlacement, Scene, Shelf, Warning, check};
 use crate::files::write_atomically;
@@ -39,7 +39,7 @@ use raw_mesh::RawMesh;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::Spanned;
 
 /// The scene format that this version reads and writes.

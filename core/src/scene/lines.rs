@@ -59,6 +59,6 @@ impl Places {
 }
 
 /// Objects are counted from one for people.
-fn name_object(at: usize, class: &str) -> String {
+pub(super) fn name_object(at: usize, class: &str) -> String {
     format!("object {} ({class})", at + 1)
 }

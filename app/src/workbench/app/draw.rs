@@ -150,13 +150,8 @@ impl App {
 
     fn layout(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>, ask: &mut Vec<Command>) {
         let layout = self.model.kept.layout;
-        let right = match layout {
-            LayoutKind::Gains => 460.0,
-            LayoutKind::Why | LayoutKind::Push | LayoutKind::Compare => 420.0,
-            _ => 330.0,
-        };
         let right = egui::Panel::right(egui::Id::new(("right", layout)))
-            .default_size(right)
+            .default_size(layout.right_width())
             .size_range(240.0..=700.0)
             .show(ui, |ui| {
                 ui.add_space(4.0);

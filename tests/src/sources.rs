@@ -71,6 +71,12 @@ impl Sources {
         &self.files[module].0
     }
 
+    /// The files below `src` whose code has a snippet in it, word by word; comments and tests do not count.
+    pub fn naming(&self, snippet: &str) -> BTreeSet<&Path> {
+        let words = text::tokens(snippet);
+        self.files.values().filter(|(_, file)| file.says(&words)).map(|(path, _)| path.as_path()).collect()
+    }
+
     /// What each module uses of others.
     pub fn uses(&self) -> BTreeMap<ModulePath, BTreeSet<ModulePath>> {
         let of = |module: &ModulePath| {
@@ -126,27 +132,40 @@ impl Sources {
 
     /// The circles of uses: groups of modules in which each leads to every other.
     pub fn circles(&self) -> Vec<Vec<ModulePath>> {
-        let uses = self.uses();
-        let reach = |from: &ModulePath| {
-            let (mut reached, mut next) = (BTreeSet::new(), vec![from]);
-            while let Some(module) = next.pop() {
-                for to in &uses[module] {
-                    if reached.insert(to.clone()) {
-                        next.push(to);
-                    }
+        circles(&self.uses())
+    }
+
+    /// The circles that are left where a module may use what the modules around it define, as in `use super::Thing`: a
+    /// module and what is inside it are one room.
+    pub fn circles_between_rooms(&self) -> Vec<Vec<ModulePath>> {
+        let mut uses = self.uses();
+        for (module, used) in &mut uses {
+            used.retain(|used| !module.starts_with(used));
+        }
+        circles(&uses)
+    }
+}
+
+fn circles(uses: &BTreeMap<ModulePath, BTreeSet<ModulePath>>) -> Vec<Vec<ModulePath>> {
+    let reach = |from: &ModulePath| {
+        let (mut reached, mut next) = (BTreeSet::new(), vec![from]);
+        while let Some(module) = next.pop() {
+            for to in &uses[module] {
+                if reached.insert(to.clone()) {
+                    next.push(to);
                 }
             }
-            reached
-        };
-        let reached: BTreeMap<&ModulePath, BTreeSet<ModulePath>> = uses.keys().map(|from| (from, reach(from))).collect();
-        let mut circles: Vec<Vec<ModulePath>> = Vec::new();
-        for (from, to) in &reached {
-            if to.contains(*from) && !circles.iter().any(|circle| circle.contains(from)) {
-                circles.push(to.iter().filter(|other| reached[*other].contains(*from)).cloned().collect());
-            }
         }
-        circles
+        reached
+    };
+    let reached: BTreeMap<&ModulePath, BTreeSet<ModulePath>> = uses.keys().map(|from| (from, reach(from))).collect();
+    let mut circles: Vec<Vec<ModulePath>> = Vec::new();
+    for (from, to) in &reached {
+        if to.contains(*from) && !circles.iter().any(|circle| circle.contains(from)) {
+            circles.push(to.iter().filter(|other| reached[*other].contains(*from)).cloned().collect());
+        }
     }
+    circles
 }
 
 /// A module's path as code writes it; `crate` for the root.

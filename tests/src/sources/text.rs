@@ -18,20 +18,29 @@ pub struct File {
     pub children: Vec<String>,
     /// What it names.
     pub named: Vec<Named>,
+    /// Its words and signs, those of tests left out; strings in their quotes.
+    pub tokens: Vec<String>,
 }
 
 impl File {
     /// Reads a file's text.
     pub fn of(text: &str) -> Self {
-        let tokens = tokens(text);
-        let mut reader = Reader { tokens: &tokens, at: 0, file: Self { children: Vec::new(), named: Vec::new() } };
+        let tokens = without_tests(tokens(text));
+        let mut reader = Reader { tokens: &tokens, at: 0, children: Vec::new(), named: Vec::new() };
         reader.items();
-        reader.file
+        let Reader { children, named, .. } = reader;
+        Self { children, named, tokens }
+    }
+
+    /// Whether the code has these words and signs in a row.
+    pub fn says(&self, words: &[String]) -> bool {
+        self.tokens.windows(words.len()).any(|window| window == words)
     }
 }
 
-/// The words and signs of a text, without comments, strings, characters and lifetimes; `::` is one sign.
-fn tokens(text: &str) -> Vec<String> {
+/// The words and signs of a text, without comments, characters and lifetimes; `::` is one sign, and so is a string with its
+/// quotes.
+pub fn tokens(text: &str) -> Vec<String> {
     let chars: Vec<char> = text.chars().collect();
     let (mut tokens, mut at) = (Vec::new(), 0);
     let is_word = |c: char| c.is_alphanumeric() || c == '_';
@@ -48,19 +57,25 @@ fn tokens(text: &str) -> Vec<String> {
             }
             at += 2;
         } else if c == 'r' && (look(at + 1) == '"' || look(at + 1) == '#' && matches!(look(at + 2), '"' | '#')) {
+            let from = at;
             let hashes = chars[at + 1..].iter().take_while(|c| **c == '#').count();
             at += hashes + 2;
-            let ends = |at: usize| chars[at] == '"' && chars[at + 1..].iter().take(hashes).filter(|c| **c == '#').count() == hashes;
+            let ends = |at: usize| {
+                chars[at] == '"' && chars[at + 1..].iter().take(hashes).filter(|c| **c == '#').count() == hashes
+            };
             while at < chars.len() && !ends(at) {
                 at += 1;
             }
             at += hashes + 1;
+            tokens.push(chars[from..at.min(chars.len())].iter().collect());
         } else if c == '"' {
+            let from = at;
             at += 1;
             while at < chars.len() && chars[at] != '"' {
                 at += if chars[at] == '\\' { 2 } else { 1 };
             }
             at += 1;
+            tokens.push(chars[from..at.min(chars.len())].iter().collect());
         } else if c == '\'' {
             // A character, or a lifetime.
             if look(at + 1) == '\\' {
@@ -96,10 +111,41 @@ fn tokens(text: &str) -> Vec<String> {
     tokens
 }
 
+/// Leaves out every item that stands behind `#[cfg(test)]`.
+fn without_tests(tokens: Vec<String>) -> Vec<String> {
+    let is_test =
+        |at: usize| tokens[at..].iter().take(7).map(String::as_str).eq(["#", "[", "cfg", "(", "test", ")", "]"]);
+    let (mut kept, mut at) = (Vec::new(), 0);
+    while at < tokens.len() {
+        if is_test(at) {
+            at = end_of_item(&tokens, at + 7);
+        } else {
+            kept.push(tokens[at].clone());
+            at += 1;
+        }
+    }
+    kept
+}
+
+/// Where an item ends that begins at `at`: behind its semicolon, or behind its braces.
+fn end_of_item(tokens: &[String], mut at: usize) -> usize {
+    let mut depth = 0;
+    while at < tokens.len() {
+        let word = tokens[at].as_str();
+        depth += i32::from(matches!(word, "{" | "(" | "[")) - i32::from(matches!(word, "}" | ")" | "]"));
+        at += 1;
+        if depth == 0 && matches!(word, ";" | "}") {
+            break;
+        }
+    }
+    at
+}
+
 struct Reader<'a> {
     tokens: &'a [String],
     at: usize,
-    file: File,
+    children: Vec<String>,
+    named: Vec<Named>,
 }
 
 impl Reader<'_> {
@@ -115,22 +161,16 @@ impl Reader<'_> {
             let inside = braces.iter().filter(|is_module| **is_module).count();
             let (word, next) = (self.look(0).to_owned(), self.look(1).to_owned());
             match word.as_str() {
-                "#" if next == "[" => {
-                    if self.attribute() {
-                        self.skip_item();
-                    }
-                    continue;
-                }
                 "pub" => {
                     is_public = true;
                     self.at += 1;
                     if self.look(0) == "(" {
-                        self.skip_group("(", ")");
+                        self.skip_brackets();
                     }
                     continue;
                 }
                 "mod" if self.look(2) == ";" => {
-                    self.file.children.push(next);
+                    self.children.push(next);
                     self.at += 3;
                 }
                 "mod" if self.look(2) == "{" => {
@@ -149,14 +189,17 @@ impl Reader<'_> {
                     }
                     self.at += 1;
                 }
-                _ if is_name(&word) && next == "::" && (self.at == 0 || !matches!(self.tokens[self.at - 1].as_str(), "::" | ".")) => {
+                _ if is_name(&word)
+                    && next == "::"
+                    && (self.at == 0 || !matches!(self.tokens[self.at - 1].as_str(), "::" | ".")) =>
+                {
                     let mut path = vec![word];
                     self.at += 1;
                     while self.look(0) == "::" && is_name(self.look(1)) {
                         path.push(self.look(1).to_owned());
                         self.at += 2;
                     }
-                    self.file.named.push(Named { path, name: None, is_reexport: false, inside });
+                    self.named.push(Named { path, name: None, is_reexport: false, inside });
                 }
                 _ => self.at += 1,
             }
@@ -164,37 +207,12 @@ impl Reader<'_> {
         }
     }
 
-    /// Passes an attribute; says whether it keeps what follows for tests.
-    fn attribute(&mut self) -> bool {
-        self.at += 1;
-        let from = self.at;
-        self.skip_group("[", "]");
-        self.tokens[from..self.at].concat() == "[cfg(test)]"
-    }
-
-    /// Passes an item: to its semicolon, or to the end of its braces.
-    fn skip_item(&mut self) {
-        while self.at < self.tokens.len() {
-            match self.look(0) {
-                ";" => return self.at += 1,
-                "{" => return self.skip_group("{", "}"),
-                "(" => self.skip_group("(", ")"),
-                "[" => self.skip_group("[", "]"),
-                _ => self.at += 1,
-            }
-        }
-    }
-
-    fn skip_group(&mut self, open: &str, close: &str) {
-        let mut depth = 0;
-        while self.at < self.tokens.len() {
-            let word = self.look(0);
-            depth += i32::from(word == open) - i32::from(word == close);
+    /// Passes what stands in brackets.
+    fn skip_brackets(&mut self) {
+        while !matches!(self.look(0), ")" | "") {
             self.at += 1;
-            if depth == 0 {
-                return;
-            }
         }
+        self.at += 1;
     }
 
     /// Reads what follows `use`, or one branch of it.
@@ -227,7 +245,7 @@ impl Reader<'_> {
             name = Some(self.look(1).to_owned());
             self.at += 2;
         }
-        self.file.named.push(Named { path, name, is_reexport, inside });
+        self.named.push(Named { path, name, is_reexport, inside });
     }
 }
 

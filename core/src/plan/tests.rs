@@ -10,8 +10,9 @@ use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 mod clairvoyant;
+mod kept;
+mod mem;
 mod policies;
-mod unseen;
 
 const BUDGET: usize = 20;
 
@@ -210,86 +211,115 @@ fn push() -> Push {
 }
 
 #[test]
-fn mem_looks_from_the_best_view_and_reports_all_gains() {
+fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
     let mut table = Table::new();
-    let first = table.decide(PolicyKind::Mem);
-    let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
-    let gains = gain_of_views(&GainField::new(&table.belief), &table.views, &ids, RayDensity::FULL);
-    assert_eq!(first.gains, gains);
-    let best = (0..12).max_by(|&a, &b| gains[a].total_cmp(&gains[b])).expect("views");
-    assert_eq!(first.action, Action::Look { view: ViewId(best as u16) });
-    assert_eq!(first.pair[0], ViewId(best as u16));
-    assert_eq!(first.best_gain(), Some(gains[best]));
-    assert!(first.igv > gains[best] && first.pair.len() == 2);
-
-    // Used up, it is still reported, but not chosen.
-    table.history.record(&first, false);
-    let second = table.decide(PolicyKind::Mem);
-    assert_eq!(second.gains, first.gains);
-    assert!(!second.pair.contains(&ViewId(best as u16)));
-    assert_ne!(second.action, first.action);
-}
-
-#[test]
-fn mem_weighs_no_push_where_none_is_allowed() {
-    let check = |table: &Table, reason: Reason| {
-        let decision = table.decide(PolicyKind::Mem);
-        assert_eq!(decision.reason, reason);
-        assert!(!is_push(&decision) && decision.candidates.is_empty() && decision.best_push.is_none());
-        assert_eq!((decision.igm, decision.reg), (0.0, 0.0));
+    table.belief = Belief::uniform(table.belief.grid);
+    let best_height = |table: &Table| {
+        let Action::Look { view } = table.decide(PolicyKind::MemNoPush).action else { panic!("a look") };
+        table.views.view(view).expect("a view").position().z
     };
-    for step in 0..3 {
-        check(&Table::after_looks(step), Reason::TooEarly);
-    }
-    check(&Table::after_looks(BUDGET - 1), Reason::LastStep);
-    let mut dropped = Table::after_looks(6);
-    dropped.history.dropped = true;
-    check(&dropped, Reason::Dropped);
-    let mut complete = Table::after_looks(6);
-    complete.belief.semantics.iter_mut().for_each(|a| a[14] += 200.0);
-    check(&complete, Reason::MapComplete);
-    let mut pushed = Table::after_looks(6);
-    pushed.history.actions.push(Action::Push(push()));
-    check(&pushed, Reason::JustPushed);
+    let heights: Vec<f32> = table.views.views.iter().map(|view| view.position().z).collect();
+    let highest = heights.iter().copied().fold(0.0, f32::max);
+    assert!(heights.iter().any(|height| *height < highest - 0.05), "views of several heights");
+    table.settings = table.settings.counting(Counted::Unseen);
+    table.seen = Some(VoxelSet::empty(&table.belief.grid));
+    assert!((best_height(&table) - highest).abs() < 1e-6);
+
+    // It is worth it for what it sees past the front: with p = 0.5 everywhere nothing of the back half would be reached.
+    let nothing = VoxelSet::empty(&table.belief.grid);
+    let view = table.decide(PolicyKind::MemNoPush).pair[0];
+    let share_of_back = |field: &GainField| {
+        let grid = &table.belief.grid;
+        let sources = gain_sources(field, &table.views, view, RayDensity::FULL);
+        let behind = |voxel: usize| 2 * usize::from(grid.voxel(voxel).y) >= grid.dims[1];
+        let sum = |of: &dyn Fn(usize) -> bool| -> f32 { sources.iter().filter(|s| of(s.0)).map(|s| s.1).sum() };
+        sum(&behind) / sum(&|_| true)
+    };
+    let (standing, flat) = (gain_field(&table.belief, Some(&nothing)), GainField::new(&table.belief));
+    assert!(share_of_back(&standing) > 0.05, "{}", share_of_back(&standing));
+    assert!(share_of_back(&flat.with_seen(&nothing)) < 0.01);
 }
 
 #[test]
-fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
-    let mut table = Table::after_looks(6);
-    table.update = Box::new(Prophet::Forgets);
-    let decision = table.decide(PolicyKind::Mem);
-    assert_eq!(decision.reason, Reason::PushTellsMore);
-    assert!(is_push(&decision) && decision.igm > decision.igv);
-    let best = &decision.candidates[decision.best_push.expect("a best push")];
-    assert_eq!(decision.action, Action::Push(best.push));
-    assert_eq!((best.gain, best.reg), (Some(decision.igm), Some(decision.reg)));
-
-    // The winner is scored in full: all views, all rays.
-    let blank = Belief::uniform(table.belief.grid);
+fn where_only_unseen_voxels_count_each_counts_once() {
+    let mut table = Table::after_looks(1);
+    table.settings = table.settings.counting(Counted::Unseen);
     let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
-    let gains = gain_of_views(&GainField::new(&blank), &table.views, &ids, RayDensity::FULL);
-    let worth = best.view.expect("a view");
-    assert_eq!(decision.igm, gains[usize::from(worth.0)]);
-    assert!(gains.iter().all(|gain| *gain <= decision.igm));
-    // The others compare: same prediction, coarse rays, scaled.
-    for other in decision.candidates.iter().filter_map(|candidate| candidate.gain) {
-        assert!((other / decision.igm - 1.0).abs() < 0.1, "{other} {}", decision.igm);
-    }
+    let field = GainField::new(&table.belief);
+    let mut seen = VoxelSet::empty(&table.belief.grid);
+    (0..table.belief.grid.voxel_count()).step_by(2).for_each(|voxel| seen.insert(voxel));
+    let field = field.with_seen(&seen);
+    let coverage = Coverage::new(&field, &table.views, &ids, RayDensity::FULL);
+    table.seen = Some(seen);
+    let decision = table.decide(PolicyKind::MemNoPush);
+    assert_eq!(decision.gains, coverage.gains());
+    let offered = |view: &ViewId| !table.history.used_views.contains(view);
+    let pair = coverage.best_pair(&decision.gains, offered).expect("a pair");
+    assert_eq!(decision.action, Action::Look { view: pair.first });
+    assert_eq!(decision.pair, [pair.first, pair.second.expect("a second view")]);
+    // What a view's gain comes from is counted alike.
+    let sources = gain_sources(&field, &table.views, pair.first, RayDensity::FULL);
+    let sum: f64 = sources.iter().map(|(_, nats)| f64::from(*nats)).sum();
+    assert!((sum / f64::from(pair.first_gain) - 1.0).abs() < 1e-4, "{sum} {}", pair.first_gain);
+}
 
-    table.history.used_views = vec![worth];
-    table.history.record(&decision, false);
-    assert!(table.history.used_views.is_empty(), "a push clears the used views");
-    let next = table.decide(PolicyKind::Mem);
-    assert_eq!((next.action, next.reason), (Action::Look { view: worth }, Reason::ViewOfPush));
-    assert!(next.candidates.is_empty());
-    // Where unseen voxels count, it looks where most is to be gained now: the push may have done something else.
-    let settings = table.settings;
-    table.settings = settings.counting(Counted::Unseen);
-    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::JustPushed);
-    table.settings = settings;
-    table.history.record(&next, false);
-    assert_eq!(table.history.view_of_push, None);
-    assert_ne!(table.decide(PolicyKind::Mem).reason, Reason::ViewOfPush);
+#[test]
+fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
+    // The boxes leave; what stood behind them is as unknown as before.
+    struct Clears;
+    impl BeliefUpdate for Clears {
+        fn name(&self) -> &str {
+            "clears"
+        }
+
+        fn observe(&self, belief: &Belief, _: &MapObservation) -> Belief {
+            belief.clone()
+        }
+
+        fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+            let cleared = |a: &[f32; 2]| if a[0] > a[1] { [1.0, 100.0] } else { *a };
+            let prediction = PushPrediction {
+                window: Window::whole(&belief.grid),
+                occupancy: belief.occupancy.iter().map(cleared).collect(),
+                semantics: belief.semantics.clone(),
+                change: vec![1.0; belief.grid.cell_count()],
+            };
+            vec![prediction; pushes.len()]
+        }
+    }
+    let mut table = Table::after_looks(6);
+    table.update = Box::new(Clears);
+    table.settings = table.settings.counting(Counted::Unseen);
+    let field = GainField::new(&table.belief);
+    let ids: Vec<ViewId> = (0..12).map(ViewId).collect();
+    let decision = table.decide(PolicyKind::Mem);
+    let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
+    assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
+    let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
+    let opened =
+        Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(std::slice::from_ref(&prediction))[0];
+    let sources = push_sources(Counted::Unseen, &field, &table.views, &ids, &prediction, None);
+    let sum: f32 = sources.iter().map(|(_, nats)| nats).sum();
+    assert!((sum - opened).abs() < 1e-3 * opened, "what the push opens is told by voxel: {sum}, {opened}");
+    assert!(opened > 1.0 && decision.igm == opened, "{opened} {}", decision.igm);
+    let best = &decision.candidates[decision.best_push.expect("a push")];
+    assert!(best.gain == Some(opened) && best.view.is_some());
+
+    // It pushes once looking has less to tell than the push, by far.
+    assert_eq!(decision.reason, Reason::LookTellsMore);
+    table.settings.patience = 0.9 * decision.igm / decision.igv;
+    table.settings.push_floor = 0.0;
+    let decision = table.decide(PolicyKind::Mem);
+    assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Push(best.push)));
+
+    // What a push only blurs is worth nothing.
+    table.seen =
+        Some((0..table.belief.grid.voxel_count()).fold(VoxelSet::empty(&table.belief.grid), |mut all, voxel| {
+            all.insert(voxel);
+            all
+        }));
+    table.update = Box::new(Prophet::Forgets);
+    assert_eq!(table.decide(PolicyKind::Mem).igm, 0.0);
 }
 
 #[test]
@@ -366,41 +396,4 @@ fn decisions_do_not_depend_on_the_number_of_threads() {
     for policy in PolicyKind::ALL {
         assert_eq!(on(1, policy), on(3, policy), "{policy}");
     }
-}
-
-#[test]
-fn a_history_takes_down_what_was_done() {
-    let table = Table::new();
-    let look = table.decide(PolicyKind::MemNoPush);
-    let mut history = History::default();
-    history.record(&look, false);
-    assert_eq!((history.actions.len(), history.used_views.len()), (1, 1));
-    assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
-
-    let candidate = CandidateRecord { gain: Some(1.0), view: Some(ViewId(3)), ..CandidateRecord::of(push()) };
-    let pushed =
-        Decision { action: Action::Push(push()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
-    history.record(&pushed, false);
-    assert!(history.just_pushed() && history.used_views.is_empty());
-    assert_eq!((history.view_of_push, history.best_gains.len()), (Some(ViewId(3)), 1));
-    // A push by hand is not the one that was weighed; after a drop there is nothing to look at.
-    let by_hand = Push { length_m: 0.07, ..push() };
-    history.record(&Decision { action: Action::Push(by_hand), ..pushed.clone() }, false);
-    assert_eq!((history.view_of_push, history.dropped), (None, false));
-    history.record(&pushed, true);
-    assert_eq!((history.view_of_push, history.dropped), (None, true));
-    history.record(&look, false);
-    assert!(history.dropped, "a drop is for ever");
-}
-
-#[test]
-fn a_decision_survives_its_file() {
-    let mut table = Table::after_looks(6);
-    table.update = Box::new(Prophet::Forgets);
-    let decision = table.decide(PolicyKind::Mem);
-    let json = serde_json::to_value(&decision).expect("json");
-    assert_eq!(json["action"]["kind"], "push");
-    assert!(json["action"]["start"].is_array() && json["action"]["length_m"].is_number());
-    assert_eq!(json["reason"], "push_tells_more");
-    assert_eq!(serde_json::from_value::<Decision>(json).expect("back"), decision);
 }

@@ -10,7 +10,7 @@ use super::push_review::{self, Review};
 use super::table::Sort;
 use super::textures::{self, Textures};
 use super::weighed;
-use super::{NO_EPISODE, Panel, Touched, empty, heading, maps, words};
+use super::{NO_EPISODE, Touched, empty, heading, maps, words};
 use crate::colors::Colormap;
 use crate::picture;
 use crate::workbench::command::Command;
@@ -66,7 +66,7 @@ impl Default for State {
     }
 }
 
-impl Panel for State {
+impl super::Panel for State {
     /// Draws the candidates and what the chosen one would do.
     fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
         self.scrubbed = model.scrubbed;

@@ -66,11 +66,6 @@ impl Sources {
         self.files.keys()
     }
 
-    /// The path of a module's file below `src`.
-    pub fn file(&self, module: &ModulePath) -> &Path {
-        &self.files[module].0
-    }
-
     /// The files below `src` whose code has a snippet in it, word by word; comments and tests do not count.
     pub fn naming(&self, snippet: &str) -> BTreeSet<&Path> {
         let words = text::tokens(snippet);

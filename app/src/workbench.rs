@@ -28,6 +28,7 @@ pub mod session;
 pub mod shot;
 pub mod space;
 pub mod tasks;
+pub mod theme;
 pub mod threads;
 pub mod toasts;
 pub mod viewer;

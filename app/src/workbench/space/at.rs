@@ -4,7 +4,7 @@
 pub const SHELF: &str = "shelf/panels";
 /// Its edges.
 pub const EDGES: &str = "shelf/edges";
-/// The true objects as glass.
+/// The outlines of the true objects.
 pub const OBJECTS: &str = "objects";
 /// The belief of the shown episode.
 pub const BELIEF: &str = "belief";
@@ -34,7 +34,7 @@ pub const ARM_PATH: &str = "robot/path";
 pub const GAIN: &str = "gain";
 /// The belief of the second episode.
 pub const OTHER: &str = "other/belief";
-/// Its true objects.
+/// The outlines of its true objects.
 pub const OTHER_OBJECTS: &str = "other/objects";
 /// How the two beliefs differ.
 pub const BETWEEN: &str = "between";

@@ -12,7 +12,7 @@ DATA := $(CURDIR)/out/data
 DEMO := scenes/high/can-phalanx.toml
 
 .PHONY: help setup graphics python networks headless demo workbench workbench-build train train-push \
-	test test-core test-headless test-window regress bench bench-window lint lint-classical once install uninstall
+	test test-core test-headless test-window regress bench bench-window lint lint-classical how-to-add once install uninstall
 help:
 	@echo 'make demo             map a crowded shelf with and without pushes: prints the table, writes out/demo/'
 	@echo 'make workbench        build and open the window (make workbench-build: build only)'
@@ -109,6 +109,10 @@ lint: graphics networks
 # The build without libtorch: it compiles, without warnings.
 lint-classical: setup
 	$(LINT) --no-default-features
+
+# Adds one of each to a copy of the sources, in the files that ARCHITECTURE.md lists, and compiles it.
+how-to-add: graphics networks
+	scripts/how-to-add.sh
 
 once: networks
 	scripts/compiled-once.sh

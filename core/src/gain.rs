@@ -33,6 +33,7 @@
 mod code;
 mod cover;
 mod field;
+mod layout;
 mod open;
 mod pair;
 mod ray;

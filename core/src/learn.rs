@@ -12,6 +12,7 @@ mod bytes;
 mod card;
 mod dataset;
 mod evaluate;
+mod kind;
 mod make;
 mod maps;
 mod pushes;
@@ -19,9 +20,10 @@ mod shard;
 #[cfg(feature = "cnabu")]
 mod train;
 
-pub use card::{Card, Kind, NAME as CARD_NAME};
+pub use card::{Card, NAME as CARD_NAME};
 pub use dataset::Dataset;
 pub use evaluate::{PushTallies, evaluate, evaluate_after_pushes, evaluate_pushes, fit_change_temperature};
+pub use kind::Kind;
 pub use make::{Progress, make};
 pub use maps::{MapSample, Recipe, Stretch, ViewSample};
 pub use pushes::{PUSHES, PushSample, PushedSample, VIEWS_AFTER};

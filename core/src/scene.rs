@@ -8,6 +8,7 @@ mod catalog;
 mod check;
 mod file;
 mod generate;
+mod lines;
 mod mesh;
 pub mod outline;
 mod overlap;
@@ -129,10 +130,10 @@ impl Scene {
     /// The objects as bodies, by [`ObjectId`], each standing on the board where the scene puts it. The mass of a
     /// stretched object grows with its volume.
     pub fn bodies(&self, catalog: &Catalog) -> Result<Vec<Body>> {
-        self.bodies_at(catalog, &file::Places::without_file(format!("scene {}", self.name)))
+        self.bodies_at(catalog, &lines::Places::without_file(format!("scene {}", self.name)))
     }
 
-    fn bodies_at(&self, catalog: &Catalog, places: &file::Places) -> Result<Vec<Body>> {
+    fn bodies_at(&self, catalog: &Catalog, places: &lines::Places) -> Result<Vec<Body>> {
         let mut solids: BTreeMap<(&str, [u32; 3]), Arc<Solid>> = BTreeMap::new();
         let mut bodies = Vec::with_capacity(self.objects.len());
         for (at, object) in self.objects.iter().enumerate() {

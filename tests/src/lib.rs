@@ -1,5 +1,7 @@
 //! What the end-to-end tests share: running the binary, and the stock tools that read what it writes.
 
+pub mod sources;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

@@ -1,6 +1,5 @@
 //! What a bench consists of: sets of scenes, policies, seeds, a budget, and which share of it is this shard's.
 
-use super::makers::AlsoMadeBy;
 use nudge_core::camera::NoiseModel;
 use nudge_core::files::names_in;
 use nudge_core::made_by::MadeBy;
@@ -91,6 +90,18 @@ pub struct BrokenScene {
     pub id: String,
     /// What is wrong, file and place named.
     pub error: String,
+}
+
+/// Another maker of a bench's results, beside the one that began it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlsoMadeBy {
+    /// What made them; `None` where nothing tells.
+    pub made_by: Option<MadeBy>,
+    /// What is other than in the bench's own `made_by`, in words.
+    pub differs: Vec<String>,
+    /// Whether it keeps results from standing together: `--allow-mixed` let it in. Another commit with the same code of the
+    /// method, for one, does not.
+    pub mixed: bool,
 }
 
 /// One episode of a bench, by positions in its plan.

@@ -3,8 +3,8 @@
 
 use super::layout::{LEVELS, Layout, Mirror, OCCUPANCY, SEMANTICS, SUBS, VOXELS_PER_LEVEL};
 use super::observe_net::{Evidence, LOG_EVIDENCE_LIMIT};
+use super::pool::Pool;
 use super::push_net::{Body, MARKS, Pixels, PriorParts, PushNet, PushPlanes, WINDOW};
-use super::update::Pool;
 use crate::belief::{Belief, Carried, FloorPlan, PushPrediction, SOLID, SweptPush};
 use crate::grid::Window;
 use crate::scene::CLASS_COUNT;

@@ -1,36 +1,16 @@
 //! The card of a data directory: everything that determines its samples.
 
-use super::{Recipe, SAMPLES_PER_SHARD, Stretch, VIEWS};
+use super::{Kind, Recipe, SAMPLES_PER_SHARD, Stretch, VIEWS};
 use crate::files::write_atomically;
 use crate::grid::Grid;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::fmt;
 use std::path::Path;
 
 /// File name of the card.
 pub const NAME: &str = "card.toml";
 /// Number of this layout of directory and records.
 const FORMAT: u32 = 2;
-
-/// What a directory's samples are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// Scenes seen from views.
-    Maps,
-    /// Scenes seen from views, and pushes.
-    Pushes,
-}
-
-impl fmt::Display for Kind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Maps => "maps",
-            Self::Pushes => "pushes",
-        })
-    }
-}
 
 /// The card: what the samples follow from, and how many there are to be.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -10,6 +10,9 @@ use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 mod clairvoyant;
+mod kept;
+mod mem;
+mod policies;
 
 const BUDGET: usize = 20;
 
@@ -209,89 +212,6 @@ fn push() -> Push {
 }
 
 #[test]
-fn mem_looks_from_the_best_view_and_reports_all_gains() {
-    let mut table = Table::new();
-    let first = table.decide(PolicyKind::Mem);
-    let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
-    let gains = gain_of_views(&GainField::new(&table.belief), &table.views, &ids, RayDensity::FULL);
-    assert_eq!(first.gains, gains);
-    let best = (0..12).max_by(|&a, &b| gains[a].total_cmp(&gains[b])).expect("views");
-    assert_eq!(first.action, Action::Look { view: ViewId(best as u16) });
-    assert_eq!(first.pair[0], ViewId(best as u16));
-    assert_eq!(first.best_gain(), Some(gains[best]));
-    assert!(first.igv > gains[best] && first.pair.len() == 2);
-
-    // Used up, it is still reported, but not chosen.
-    table.history.record(&first, false);
-    let second = table.decide(PolicyKind::Mem);
-    assert_eq!(second.gains, first.gains);
-    assert!(!second.pair.contains(&ViewId(best as u16)));
-    assert_ne!(second.action, first.action);
-}
-
-#[test]
-fn mem_weighs_no_push_where_none_is_allowed() {
-    let check = |table: &Table, reason: Reason| {
-        let decision = table.decide(PolicyKind::Mem);
-        assert_eq!(decision.reason, reason);
-        assert!(!is_push(&decision) && decision.candidates.is_empty() && decision.best_push.is_none());
-        assert_eq!((decision.igm, decision.reg), (0.0, 0.0));
-    };
-    for step in 0..3 {
-        check(&Table::after_looks(step), Reason::TooEarly);
-    }
-    check(&Table::after_looks(BUDGET - 1), Reason::LastStep);
-    let mut dropped = Table::after_looks(6);
-    dropped.history.dropped = true;
-    check(&dropped, Reason::Dropped);
-    let mut complete = Table::after_looks(6);
-    complete.belief.semantics.iter_mut().for_each(|a| a[14] += 200.0);
-    check(&complete, Reason::MapComplete);
-    let mut pushed = Table::after_looks(6);
-    pushed.history.actions.push(Action::Push(push()));
-    check(&pushed, Reason::JustPushed);
-}
-
-#[test]
-fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
-    let mut table = Table::after_looks(6);
-    table.update = Box::new(Prophet::Forgets);
-    let decision = table.decide(PolicyKind::Mem);
-    assert_eq!(decision.reason, Reason::PushTellsMore);
-    assert!(is_push(&decision) && decision.igm > decision.igv);
-    let best = &decision.candidates[decision.best_push.expect("a best push")];
-    assert_eq!(decision.action, Action::Push(best.push));
-    assert_eq!((best.gain, best.reg), (Some(decision.igm), Some(decision.reg)));
-
-    // The winner is scored in full: all views, all rays.
-    let blank = Belief::uniform(table.belief.grid);
-    let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
-    let gains = gain_of_views(&GainField::new(&blank), &table.views, &ids, RayDensity::FULL);
-    let worth = best.view.expect("a view");
-    assert_eq!(decision.igm, gains[usize::from(worth.0)]);
-    assert!(gains.iter().all(|gain| *gain <= decision.igm));
-    // The others compare: same prediction, coarse rays, scaled.
-    for other in decision.candidates.iter().filter_map(|candidate| candidate.gain) {
-        assert!((other / decision.igm - 1.0).abs() < 0.1, "{other} {}", decision.igm);
-    }
-
-    table.history.used_views = vec![worth];
-    table.history.record(&decision, false);
-    assert!(table.history.used_views.is_empty(), "a push clears the used views");
-    let next = table.decide(PolicyKind::Mem);
-    assert_eq!((next.action, next.reason), (Action::Look { view: worth }, Reason::ViewOfPush));
-    assert!(next.candidates.is_empty());
-    // Where unseen voxels count, it looks where most is to be gained now: the push may have done something else.
-    let settings = table.settings;
-    table.settings = settings.counting(Counted::Unseen);
-    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::JustPushed);
-    table.settings = settings;
-    table.history.record(&next, false);
-    assert_eq!(table.history.view_of_push, None);
-    assert_ne!(table.decide(PolicyKind::Mem).reason, Reason::ViewOfPush);
-}
-
-#[test]
 fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
     let mut table = Table::new();
     table.belief = Belief::uniform(table.belief.grid);
@@ -488,81 +408,6 @@ fn mem_looks_when_no_push_is_feasible() {
 }
 
 #[test]
-fn a_policy_that_never_pushes_never_does() {
-    for policy in [PolicyKind::MemNoPush, PolicyKind::Random, PolicyKind::RandomCnabu] {
-        let mut table = Table::new();
-        table.update = Box::new(Prophet::Forgets);
-        let decisions = table.run(policy, 11);
-        assert!(decisions.iter().all(|d| !is_push(d) && d.reason == Reason::Schedule && d.candidates.is_empty()));
-        let mut seen = table.history.used_views.clone();
-        seen.sort();
-        seen.dedup();
-        assert_eq!(seen.len(), 11, "{policy}: no view twice");
-    }
-}
-
-#[test]
-fn random_views_follow_the_seed() {
-    let run = |policy, seed| {
-        let mut table = Table { seed, ..Table::new() };
-        table.run(policy, 8);
-        table.history.used_views
-    };
-    assert_eq!(run(PolicyKind::Random, 1), run(PolicyKind::Random, 1));
-    assert_eq!(run(PolicyKind::Random, 1), run(PolicyKind::RandomCnabu, 1), "they differ in the belief alone");
-    assert_ne!(run(PolicyKind::Random, 1), run(PolicyKind::Random, 2));
-    assert_ne!(run(PolicyKind::Random, 1), run(PolicyKind::MemNoPush, 1));
-}
-
-#[test]
-fn scheduled_policies_push_every_fifth_step_but_not_in_the_last() {
-    for policy in [PolicyKind::RandomPush5, PolicyKind::RandomPush5Blind, PolicyKind::RandomViewPush5] {
-        let mut table = Table::new();
-        let decisions = table.run(policy, BUDGET);
-        assert_eq!(pushes_at(&decisions), [5, 10, 15], "{policy}");
-        assert_eq!(decisions[BUDGET - 1].reason, Reason::LastStep);
-        assert!(decisions[..BUDGET - 1].iter().all(|d| d.reason == Reason::Schedule));
-        let pushed = &decisions[4];
-        let chosen = &pushed.candidates[pushed.best_push.expect("the push")];
-        assert_eq!((chosen.rejection.as_ref(), chosen.gain, pushed.igm), (None, None, 0.0));
-        let by_gain = decisions[5].action == Action::Look { view: decisions[5].pair[0] };
-        assert!(by_gain || policy == PolicyKind::RandomViewPush5, "{policy}");
-    }
-    let mut dropped = Table::after_looks(4);
-    dropped.history.dropped = true;
-    assert_eq!(dropped.decide(PolicyKind::RandomPush5).reason, Reason::Dropped);
-    let mut bare = Table::after_looks(4);
-    bare.belief = Belief::uniform(bare.belief.grid);
-    assert_eq!(bare.decide(PolicyKind::RandomPush5).reason, Reason::NoCandidate);
-}
-
-#[test]
-fn saturation_pushes_when_two_gains_in_a_row_are_alike() {
-    let mut table = Table::after_looks(6);
-    let gain = table.decide(PolicyKind::Saturation).best_gain().expect("a gain");
-    let mut with = |previous: f32, steps: usize| {
-        table.history.actions = vec![Action::Look { view: ViewId(0) }; steps];
-        table.history.best_gains = vec![1e9, previous];
-        let decision = table.decide(PolicyKind::Saturation);
-        (is_push(&decision), decision.reason)
-    };
-    assert_eq!(with(gain * 1.01, 6), (true, Reason::Schedule));
-    assert_eq!(with(gain * 1.05, 6), (false, Reason::Schedule));
-    assert_eq!(with(gain * 1.01, 2), (false, Reason::TooEarly));
-    assert_eq!(with(gain * 1.01, BUDGET - 1), (false, Reason::LastStep));
-    assert!(!is_push(&Table::after_looks(6).decide(PolicyKind::Saturation)), "no gain to compare with");
-}
-
-#[test]
-fn the_oracle_takes_the_view_that_really_tells_most() {
-    let mut table = Table::new();
-    let first = table.decide(PolicyKind::Oracle);
-    assert_eq!((first.action, first.reason), (Action::Look { view: ViewId(9) }, Reason::Schedule));
-    table.history.record(&first, false);
-    assert_eq!(table.decide(PolicyKind::Oracle).action, Action::Look { view: ViewId(11) });
-}
-
-#[test]
 fn a_map_that_has_nothing_left_to_tell_is_still_looked_at() {
     let mut table = Table::new();
     table.belief.occupancy.fill(evidence(-3.5, 40.0));
@@ -585,41 +430,4 @@ fn decisions_do_not_depend_on_the_number_of_threads() {
     for policy in PolicyKind::ALL {
         assert_eq!(on(1, policy), on(3, policy), "{policy}");
     }
-}
-
-#[test]
-fn a_history_takes_down_what_was_done() {
-    let table = Table::new();
-    let look = table.decide(PolicyKind::MemNoPush);
-    let mut history = History::default();
-    history.record(&look, false);
-    assert_eq!((history.actions.len(), history.used_views.len()), (1, 1));
-    assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
-
-    let candidate = CandidateRecord { gain: Some(1.0), view: Some(ViewId(3)), ..CandidateRecord::of(push()) };
-    let pushed =
-        Decision { action: Action::Push(push()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
-    history.record(&pushed, false);
-    assert!(history.just_pushed() && history.used_views.is_empty());
-    assert_eq!((history.view_of_push, history.best_gains.len()), (Some(ViewId(3)), 1));
-    // A push by hand is not the one that was weighed; after a drop there is nothing to look at.
-    let by_hand = Push { length_m: 0.07, ..push() };
-    history.record(&Decision { action: Action::Push(by_hand), ..pushed.clone() }, false);
-    assert_eq!((history.view_of_push, history.dropped), (None, false));
-    history.record(&pushed, true);
-    assert_eq!((history.view_of_push, history.dropped), (None, true));
-    history.record(&look, false);
-    assert!(history.dropped, "a drop is for ever");
-}
-
-#[test]
-fn a_decision_survives_its_file() {
-    let mut table = Table::after_looks(6);
-    table.update = Box::new(Prophet::Forgets);
-    let decision = table.decide(PolicyKind::Mem);
-    let json = serde_json::to_value(&decision).expect("json");
-    assert_eq!(json["action"]["kind"], "push");
-    assert!(json["action"]["start"].is_array() && json["action"]["length_m"].is_number());
-    assert_eq!(json["reason"], "push_tells_more");
-    assert_eq!(serde_json::from_value::<Decision>(json).expect("back"), decision);
 }

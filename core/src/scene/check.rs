@@ -1,6 +1,6 @@
 //! What makes a scene sound: known classes, finite numbers, everything inside the shelf, nothing overlapping.
 
-use super::file::Places;
+use super::lines::Places;
 use super::overlap::PlacedBody;
 use super::{Body, Catalog, Object, Scene, Shelf, Warning};
 use crate::Result;

@@ -8,7 +8,7 @@
 
 mod placeable;
 
-use super::file::Places;
+use super::lines::Places;
 use super::{
     Catalog, Class, ClassId, MeshShape, OBJECT_CLASS_COUNT, Object, RobotPlacement, Scene, Shelf, check, outline,
 };

@@ -406,7 +406,7 @@ impl App {
     /// Asks again where the chosen view's gain comes from, once the cursor has moved.
     pub(super) fn follow_gain(&mut self) {
         let at = self.model.session().map(|session| (session.id, self.model.cursor.min(session.steps())));
-        if let (LayoutKind::Gains, Some(of), Some(view)) = (self.model.kept.layout, at, self.model.view)
+        if let (true, Some(of), Some(view)) = (self.model.kept.layout.shows_gain(), at, self.model.view)
             && self.asked_gain != Some((of, view))
         {
             self.gain_of(view);

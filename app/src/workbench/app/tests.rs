@@ -1,9 +1,10 @@
 //! What only happens when something breaks, driven through the window. The rest is tested from outside, in `tests/`.
 
-use super::{App, FormOptions, Options, Part};
+use super::{App, FormOptions, Options};
 use crate::workbench::command::Command;
 use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, StartForm};
+use crate::workbench::part::Part;
 use crate::workbench::session::Activity;
 use crate::workbench::worker::Order;
 use egui_kittest::Harness;

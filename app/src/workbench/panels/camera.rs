@@ -2,7 +2,7 @@
 
 use super::legend::{self, Bar};
 use super::textures::Textures;
-use super::{NO_EPISODE, empty, heading};
+use super::{NO_EPISODE, Panel, empty, heading};
 use crate::colors::{self, Rgb};
 use crate::workbench::command::Command;
 use crate::workbench::model::Model;
@@ -34,11 +34,11 @@ pub struct State {
     seen: Option<(SessionId, usize, Vec<ClassId>)>,
 }
 
-/// Draws both images, side by side where there is room.
-pub fn show(ui: &mut Ui, model: &mut Model, _ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.camera);
-    draw(&mut state, ui, model);
-    model.panels.camera = state;
+impl Panel for State {
+    /// Draws both images, side by side where there is room.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, _ask: &mut Vec<Command>) {
+        draw(self, ui, model);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model) {

@@ -3,7 +3,7 @@
 use super::floor::{FloorMap, Line, Outlines};
 use super::legend::{self, Bar};
 use super::textures::{self, Textures};
-use super::{NO_EPISODE, empty, heading, maps, words};
+use super::{NO_EPISODE, Panel, empty, heading, maps, words};
 use crate::colors::{self, Colormap};
 use crate::picture::{self, FloorPlan};
 use crate::record::decision::SERIES;
@@ -51,11 +51,11 @@ pub fn first_difference(a: &Session, b: &Session) -> Option<usize> {
     pairs.position(|(a, b)| a.action != b.action).map(|at| at + 1)
 }
 
-/// Draws the comparison.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.compare);
-    draw(&mut state, ui, model, ask);
-    model.panels.compare = state;
+impl Panel for State {
+    /// Draws the comparison.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        draw(self, ui, model, ask);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) {

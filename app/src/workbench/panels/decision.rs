@@ -2,7 +2,7 @@
 
 use super::table::{self, Sort};
 use super::weighed::{self, Listed};
-use super::{NO_EPISODE, Touched, empty, heading, spark, words};
+use super::{NO_EPISODE, Panel, Touched, empty, heading, spark, words};
 use crate::colors::Colormap;
 use crate::workbench::command::Command;
 use crate::workbench::model::{Hovered, Model};
@@ -26,12 +26,12 @@ impl Default for State {
     }
 }
 
-/// Draws the decision.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.decision);
-    let touched = draw(&mut state, ui, model, ask);
-    touched.apply(model, &mut state.hovering);
-    model.panels.decision = state;
+impl Panel for State {
+    /// Draws the decision.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        let touched = draw(self, ui, model, ask);
+        touched.apply(model, &mut self.hovering);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {

@@ -15,7 +15,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         .as_ref()
         .map_or("largest".to_owned(), |source| format!("{} and more", words::significant(f64::from(source.top), 2)));
     let display = &mut model.kept.display;
-    if layout == LayoutKind::Gains {
+    if layout.shows_gain() {
         ui.horizontal(|ui| {
             ui.label("gain per voxel");
             scale(ui, Colormap::Cividis, "gain", ["0", &most], "nats");

@@ -2,7 +2,7 @@
 
 use super::facts::{self, fact};
 use super::legend::{self, Bar};
-use super::{NO_EPISODE, Touched, decision, empty, heading, spark, weighed, words};
+use super::{NO_EPISODE, Panel, Touched, decision, empty, heading, spark, weighed, words};
 use crate::colors::Colormap;
 use crate::workbench::command::Command;
 use crate::workbench::model::{GainSource, Hovered, Model};
@@ -34,15 +34,15 @@ struct Spread {
     total: f32,
 }
 
-/// Draws the heat maps and the chosen view's numbers.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.gains);
-    let touched = draw(&mut state, ui, model, ask);
-    if let Some(view) = touched.view {
-        ask.push(Command::GainOf(view));
+impl Panel for State {
+    /// Draws the heat maps and the chosen view's numbers.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        let touched = draw(self, ui, model, ask);
+        if let Some(view) = touched.view {
+            ask.push(Command::GainOf(view));
+        }
+        touched.apply(model, &mut self.hovering);
     }
-    touched.apply(model, &mut state.hovering);
-    model.panels.gains = state;
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
@@ -188,7 +188,7 @@ impl<'a> HeatMap<'a> {
             let pointed = over.map(|view| view.id).or(self.hovered);
             views.iter().filter(|view| pointed == Some(view.id)).for_each(|view| ring(view, 1.0));
         }
-        if let Some([right, up]) = super::arrows(ui, &response) {
+        if let Some([right, up]) = super::arrow_keys(ui, &response) {
             let slot = views
                 .iter()
                 .find(|view| self.selected == Some(view.id))

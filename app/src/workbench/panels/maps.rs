@@ -3,7 +3,7 @@
 use super::floor::{Drawn, FloorMap, Outlines};
 use super::legend::{self, Bar};
 use super::textures::{self, Textures};
-use super::{NO_EPISODE, empty, heading, words};
+use super::{NO_EPISODE, Panel, empty, heading, words};
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture::{self, CellError};
 use crate::workbench::command::Command;
@@ -36,12 +36,11 @@ pub struct State {
     outlines: Outlines,
 }
 
-/// Draws the maps in two columns, in one where there is little room.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.maps);
-    let slice_m = draw(&mut state, ui, model, ask);
-    model.slice_m = slice_m;
-    model.panels.maps = state;
+impl Panel for State {
+    /// Draws the maps in two columns, in one where there is little room.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        model.slice_m = draw(self, ui, model, ask);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Option<f32> {

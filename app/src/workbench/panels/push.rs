@@ -14,7 +14,7 @@ use crate::colors::Colormap;
 use crate::picture;
 use crate::workbench::command::Command;
 use crate::workbench::derive::{Derived, MapKind};
-use crate::workbench::model::{Hovered, Model, Picked, Preview};
+use crate::workbench::model::{Hovered, Model, Picked, Preview, Scrubbed};
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::arm::Push;
 use nudge_core::belief::{MOST_SURPRISING, PushPrediction};
@@ -45,7 +45,8 @@ pub struct State {
     rejected: bool,
     hovering: bool,
     review: Option<Review>,
-    motion: motion::State,
+    /// The model's, while the panel is drawn.
+    scrubbed: Scrubbed,
 }
 
 impl Default for State {
@@ -59,27 +60,19 @@ impl Default for State {
             rejected: false,
             hovering: false,
             review: None,
-            motion: motion::State::default(),
+            scrubbed: Scrubbed::default(),
         }
     }
 }
 
-impl State {
-    pub(super) fn motion_s(&self, step: (SessionId, usize)) -> Option<f64> {
-        self.motion.at_s(step)
+impl super::Panel for State {
+    /// Draws the candidates and what the chosen one would do.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        self.scrubbed = model.scrubbed;
+        let touched = draw(self, ui, model, ask);
+        model.scrubbed = self.scrubbed;
+        touched.apply(model, &mut self.hovering);
     }
-
-    pub(super) fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
-        self.motion.scrub(step, at_s);
-    }
-}
-
-/// Draws the candidates and what the chosen one would do.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.push);
-    let touched = draw(&mut state, ui, model, ask);
-    touched.apply(model, &mut state.hovering);
-    model.panels.push = state;
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
@@ -390,7 +383,7 @@ impl Here<'_> {
         ui.add_space(8.0);
         push_review::show(ui, &review, &self.session.record, moment);
         self.surprise(state, ui);
-        motion::show(ui, &mut state.motion, self.session.id, moment);
+        motion::show(ui, &mut state.scrubbed, self.session.id, moment);
     }
 
     /// Where the push that led to the state at the cursor did what was not expected of it.

@@ -253,7 +253,7 @@ impl About<'_> {
             painter.text(pos2(plot.left(), y), Align2::LEFT_BOTTOM, "0", font.clone(), ink);
             painter.text(pos2(plot.right(), y), Align2::RIGHT_BOTTOM, "1", font, ink);
         }
-        if let Some([_, up]) = super::arrows(ui, &response) {
+        if let Some([_, up]) = super::arrow_keys(ui, &response) {
             let now = self.voxel().map_or(0, |voxel| voxel - first) as i32;
             let level = (now + up).clamp(0, levels as i32 - 1) as usize;
             ask.push(Command::Pick(Some(Picked::Voxel(first + level))));

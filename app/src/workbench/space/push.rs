@@ -1,7 +1,7 @@
 //! Pushes in three dimensions: the candidates, and of the one that is looked at what is predicted and what really happened.
 
 use super::voxels::Voxels;
-use super::{Painter, Side, Space, at};
+use super::{Painter, Side, Space, at, no_arrows};
 use crate::colors;
 use crate::record::shapes;
 use crate::record::voxels::{colored, surface};
@@ -94,10 +94,6 @@ impl Painter {
             self.log(at::HAPPENED_NOTE, &shapes::words([0.0, 0.5 * depth, 0.5 * height], note));
         }
     }
-}
-
-pub(super) fn no_arrows() -> rerun::Arrows3D {
-    rerun::Arrows3D::from_vectors(Vec::<[f32; 3]>::new())
 }
 
 /// The candidates as arrows, in the colours of what they are worth by the episode's own weight of the disturbance.

@@ -1,6 +1,5 @@
 //! Which voxels of a belief are drawn, and in which colours.
 
-use super::CHANGED;
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture;
 use crate::record::voxels::surface;
@@ -9,6 +8,9 @@ use nudge_core::belief::{Belief, bernoulli_entropy};
 use nudge_core::grid::Cell;
 use nudge_core::scene::{BACKGROUND, Catalog};
 use nudge_core::world::TruthMap;
+
+/// Probability changes smaller than this are not drawn.
+const CHANGED: f32 = 0.05;
 
 /// What of the display decides about the belief's voxels.
 pub(super) fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [[f32; 2]; 3]) {

@@ -55,13 +55,19 @@ pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// A tool of the virtual environment that `make test` sets up (`NUDGE_VENV`); `None`, with a word on stderr, where
-/// there is none.
+/// A tool of the virtual environment that `make test` sets up and names in `NUDGE_VENV`. `None` only where that is set to
+/// nothing, which says that what needs the tool shall not be checked.
+///
+/// # Panics
+/// Where nothing is said, and where the tool is missing: a test that checks nothing is not to pass in silence.
 pub fn venv_tool(name: &str) -> Option<PathBuf> {
-    let Some(venv) = std::env::var_os("NUDGE_VENV") else {
-        eprintln!("skipped: NUDGE_VENV is not set, so there is no {name} (make test sets it)");
+    let venv = std::env::var_os("NUDGE_VENV");
+    let venv =
+        venv.unwrap_or_else(|| panic!("{name} is needed: `make test` sets NUDGE_VENV; set it to nothing to skip"));
+    if venv.is_empty() {
+        eprintln!("not checked: NUDGE_VENV is empty, so there is no {name}");
         return None;
-    };
+    }
     let tool = Path::new(&venv).join("bin").join(name);
     assert!(tool.exists(), "{} is missing", tool.display());
     Some(tool)

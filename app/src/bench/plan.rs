@@ -15,6 +15,9 @@ use std::path::{Path, PathBuf};
 /// The format number of `bench.json`.
 pub const FORMAT: u32 = 1;
 
+/// Most episodes that a bench may have.
+const MAX_EPISODES: u64 = 1_000_000;
+
 /// `bench.json`: which episodes a bench consists of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -127,6 +130,33 @@ impl Plan {
             }
         }
         all
+    }
+
+    /// Checks a plan that was read from `path`: how many episodes it has, the numbers of scenes and settings, and names that
+    /// lead out of the bench's directory.
+    ///
+    /// # Errors
+    /// For what no bench of this program has.
+    pub(super) fn check(&self, path: &Path) -> Result<()> {
+        let scenes: usize = self.sets.iter().map(|set| set.scenes.len()).sum();
+        let of_a_seed = scenes as u64 * self.policies.len() as u64;
+        if of_a_seed.checked_mul(self.seeds).is_none_or(|count| count > MAX_EPISODES) {
+            let message = format!("{} seeds of {of_a_seed} episodes; the limit is {MAX_EPISODES} episodes", self.seeds);
+            return Err(Error::input(path, "seeds", message));
+        }
+        let is_one_name = |name: &str| Path::new(name).file_name().is_some_and(|file| file == name);
+        for set in &self.sets {
+            let mut names = std::iter::once(&set.name).chain(set.scenes.iter().map(|scene| &scene.id));
+            if let Some(name) = names.find(|name| !is_one_name(name)) {
+                return Err(Error::input(path, "sets", format!("`{name}` is no name of a set or a scene")));
+            }
+            set.scenes.iter().try_for_each(|scene| scene.scene.check_numbers(path))?;
+        }
+        let planners = self.policies.iter().filter_map(|policy| policy.planner.as_ref());
+        for planner in std::iter::once(&self.planner).chain(planners) {
+            planner.check().map_err(|fault| Error::input(path, "planner", fault.to_string()))?;
+        }
+        Ok(())
     }
 
     /// An episode in words: `high/box-wall, random, seed 2`.

@@ -79,8 +79,8 @@ fn beliefs() {
 #[test]
 fn cards_of_data() {
     let folder = Folder::new();
-    let card = "format = 1\nkind = \"maps\"\nversion = \"0.1.0\"\nseed = 1\ncount = 100\nsamples_per_shard = 50\n\
-        views_per_sample = 20\nview_array = \"standard300\"\ndims = [160, 80, 80]\nvoxel_m = 0.005\nclasses = [\"a\"]\n\
+    let card = "format = 2\nkind = \"maps\"\nversion = \"0.1.0\"\nseed = 1\ncount = 100\nsamples_per_shard = 50\n\
+        views_per_sample = 10\nview_array = \"standard300\"\ndims = [160, 80, 80]\nvoxel_m = 0.005\nclasses = [\"a\"]\n\
         fill = [0.2, 0.4]\nrho = 0.5\nnoise_share = 0.25\n";
     let path = folder.path("card.toml");
     let target =

@@ -29,8 +29,12 @@ fn prism(outline: &[[f32; 2]]) -> (Vec<[f32; 3]>, Vec<[usize; 3]>) {
 
 fn obj((corners, triangles): &(Vec<[f32; 3]>, Vec<[usize; 3]>)) -> Vec<u8> {
     let mut text = "# made here\nmtllib a.mtl\no thing\n".to_owned();
-    corners.iter().for_each(|[x, y, z]| drop(writeln!(text, "v {x} {y} {z}")));
-    triangles.iter().for_each(|[a, b, c]| drop(writeln!(text, "f {} {}//1 {}/2/3", a + 1, b + 1, c + 1)));
+    for [x, y, z] in corners {
+        let _ = writeln!(text, "v {x} {y} {z}");
+    }
+    for [a, b, c] in triangles {
+        let _ = writeln!(text, "f {} {}//1 {}/2/3", a + 1, b + 1, c + 1);
+    }
     text.into_bytes()
 }
 

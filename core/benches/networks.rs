@@ -13,9 +13,7 @@ use nudge_core::cnabu;
 use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng::stream;
 use nudge_core::scene::{Catalog, Scene};
-use std::hint::black_box;
 use std::path::Path;
-use std::time::Instant;
 
 /// Candidates that a decision weighs.
 const CANDIDATES: usize = 80;

@@ -16,7 +16,6 @@ use nudge_core::rng::stream;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::world::{TruthMap, World};
 use nudge_tests::{nudge_bin, root};
-use std::hint::black_box;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;

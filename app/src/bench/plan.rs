@@ -351,6 +351,25 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_bench_of_endless_seeds_never_opened_and_names_led_out_of_its_folder() {
+        let refused = |change: &dyn Fn(&mut Plan)| {
+            let mut changed = plan(None);
+            change(&mut changed);
+            changed.check(Path::new("bench.json")).map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(&|_| ()), Ok(()));
+        let line = refused(&|plan| plan.seeds = u64::MAX).expect_err("endless");
+        assert!(line.starts_with("bench.json: seeds: 18446744073709551615 seeds of 4 episodes"), "{line}");
+        for name in ["../../a", "..", "a/b", "/a", ""] {
+            let line = refused(&|plan| name.clone_into(&mut plan.sets[0].name)).expect_err("leads out");
+            assert!(line.contains(&format!("`{name}` is no name")), "{line}");
+            assert!(refused(&|plan| name.clone_into(&mut plan.sets[0].scenes[1].id)).is_err(), "{name}");
+        }
+        assert!(refused(&|plan| plan.sets[0].scenes[0].scene.shelf.size[0] = 1e30).is_err());
+        assert!(refused(&|plan| plan.planner.candidates = usize::MAX).is_err());
+    }
+
+    #[test]
     fn shards_share_all_episodes_and_none_twice() {
         let mut all: Vec<EpisodeId> =
             (0..3).flat_map(|index| plan(Some(Shard { index, count: 3 })).episodes()).collect();

@@ -236,3 +236,24 @@ impl<'a> OpenArchive<'a> {
         Ok((values, precision))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_archive_that_unpacks_to_more_than_its_grid_filled_the_memory() {
+        let grid = Grid { voxel_m: 0.01, dims: [4, 3, 2], origin: [0.0; 3] };
+        let mut archive = Archive::new();
+        archive.add("occupancy", &[4, 3, 2, 2], &[1.0_f32; 48]);
+        archive.add("semantics", &[4, 3, CLASS_COUNT], &[1.0_f32; 12 * CLASS_COUNT]);
+        assert!(read_belief(&archive.finish(), Path::new("a.npz"), grid).is_ok());
+        // A thousandth of it on the disk.
+        let mut archive = Archive::new();
+        archive.add("occupancy", &[4, 3, 2, 2, 1 << 20], &vec![0.0_f32; 48 << 17]);
+        let bytes = archive.finish();
+        assert!(bytes.len() < 1 << 18);
+        let line = read_belief(&bytes, Path::new("a.npz"), grid).expect_err("refuses").to_string();
+        assert_eq!(line, "a.npz: array occupancy: has more than the 48 numbers that the scene's grid needs");
+    }
+}

@@ -48,19 +48,21 @@ while [ "$done_kills" -lt "$kills" ] || [ -e "$folder/killed" ]; do
         wait_ms=$(((RANDOM * 32768 + RANDOM) % whole_ms))
         # Wakes up when the run ends before.
         timeout "$((wait_ms / 1000)).$(printf %03d $((wait_ms % 1000)))" tail -s 0.05 --pid "$run" -f /dev/null || true
-        if kill -KILL "$run" 2>/dev/null && ! wait "$run" 2>/dev/null && ! grep -q . "$folder/said"; then
-            done_kills=$((done_kills + 1))
-            [ ${#how[@]} -gt 0 ] && resumed=$((resumed + 1))
-            if [ -e "$folder/killed" ]; then
-                python3 scripts/same_episode.py "$folder/killed" >"$folder/why" || fall "$(cat "$folder/why")"
-                [ -e "$folder/killed/episode.json" ] || before_first=$((before_first + 1))
-            fi
-            continue
-        fi
+        kill -KILL "$run" 2>/dev/null || true
     fi
-    if ! wait "$run"; then
-        grep -v '^warning:' "$folder/said" || true
-        fall "a killed run is not gone on with"
+    code=0
+    wait "$run" 2>/dev/null || code=$?
+    if [ "$code" = 137 ]; then
+        done_kills=$((done_kills + 1))
+        [ ${#how[@]} -gt 0 ] && resumed=$((resumed + 1))
+        if [ -e "$folder/killed" ]; then
+            python3 scripts/same_episode.py "$folder/killed" >"$folder/why" || fall "$(cat "$folder/why")"
+            [ -e "$folder/killed/episode.json" ] || before_first=$((before_first + 1))
+        fi
+        continue
+    fi
+    if [ "$code" != 0 ]; then
+        fall "ended with $code: $(grep -v '^warning:' "$folder/said" | tail -1)"
         continue
     fi
     ended=$((ended + 1))

@@ -14,8 +14,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, Once, PoisonError};
 use std::time::{Duration, Instant};
 
-/// No input may take longer, at the fastest of three tries.
+/// No input may take longer, at the fastest of three tries: on a machine where sound files take long, [`TIMES`] of theirs.
 const SLOW: Duration = Duration::from_secs(2);
+/// How many times as long as the slowest sound file an input may take, where that is more than [`SLOW`].
+const TIMES: u32 = 10;
 /// An input that takes longer ends the process.
 const HANGS: Duration = Duration::from_secs(60);
 /// No input may need more memory, bytes.
@@ -42,17 +44,26 @@ impl Target<'_> {
         // One at a time: the memory that is watched is the process's.
         static ALONE: Mutex<()> = Mutex::new(());
         let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut slow = SLOW;
         for sound in &self.sound {
+            let began = Instant::now();
             assert!(read(sound), "{}: a sound file is refused", self.name);
+            slow = slow.max(TIMES * began.elapsed());
         }
         let number = |name: &str| std::env::var(name).ok().map(|text| text.parse::<u64>().expect("a number"));
         let count = number("NUDGE_FUZZ").map_or(self.inputs, |count| count.try_into().unwrap_or(u32::MAX));
         let limit = number("NUDGE_FUZZ_SECONDS").map(Duration::from_secs);
         let trace = std::env::var_os("NUDGE_FUZZ_TRACE").map(PathBuf::from);
-        let config = Config { cases: count, failure_persistence: None, max_shrink_iters: 500, ..Config::default() };
+        let config = Config {
+            cases: count,
+            failure_persistence: None,
+            max_shrink_iters: 500,
+            max_shrink_time: 20_000,
+            ..Config::default()
+        };
         let mut runner = TestRunner::new_with_rng(config, random(self.name, number("NUDGE_FUZZ_SEED").unwrap_or(0)));
         let (taken, refused) = (Cell::new(0_u64), Cell::new(0_u64));
-        let watch = Watch::start(self.name);
+        let watch = Watch::start(self.name, slow);
         let began = Instant::now();
         let read = std::cell::RefCell::new(&mut read);
         let outcome = runner.run(&input(), |(which, changes)| {
@@ -113,11 +124,12 @@ struct Watch {
     reading: Reading,
     ended: Arc<AtomicBool>,
     said: Arc<Mutex<String>>,
+    slow: Duration,
 }
 
 impl Watch {
-    fn start(name: &str) -> Self {
-        let watch = Self { reading: Reading::default(), ended: Arc::default(), said: Arc::default() };
+    fn start(name: &str, slow: Duration) -> Self {
+        let watch = Self { reading: Reading::default(), ended: Arc::default(), said: Arc::default(), slow };
         let (reading, ended, name) = (watch.reading.clone(), watch.ended.clone(), name.to_owned());
         std::thread::spawn(move || {
             while !ended.load(Ordering::Relaxed) {
@@ -149,11 +161,11 @@ impl Watch {
         }
         // The machine may have had something else to do.
         for _ in 0..2 {
-            if took > SLOW {
+            if took > self.slow {
                 took = took.min(self.once(file, read)?.1);
             }
         }
-        if took > SLOW { Err(format!("takes {:.1} s", took.as_secs_f64())) } else { Ok(was_taken) }
+        if took > self.slow { Err(format!("takes {:.1} s", took.as_secs_f64())) } else { Ok(was_taken) }
     }
 
     fn once(&self, file: &[u8], read: &mut dyn FnMut(&[u8]) -> bool) -> Result<(bool, Duration), String> {

@@ -175,10 +175,10 @@ fn a_disk_that_fills_up_ends_a_bench_and_making_data_with_one_line() {
     folder.write("set/tin.toml", small_scene(TIN));
     let (set, bench, data) = (folder.name("set"), folder.name("bench"), folder.name("data"));
     let settings = ["--policies", "random", "--belief", "classical", "--seeds", "1", "--budget", "2", "--jobs", "1"];
-    let bench_of = |set| [&["bench", set, "--out", &bench], &settings[..]].concat();
-    let data_of = ["data", "maps", "--seed", "2", "--count", "1", "--noise", "0", "--out", &data];
-    for (args, file, kilobytes) in [(bench_of(&set), "random-0.json", 2), (data_of.to_vec(), "shard-00000.zst", 4)] {
-        let (status, said) = ends(with_small_files(kilobytes, &args));
+    let benching = [&["bench", &set, "--out", &bench], &settings[..]].concat();
+    let making = ["data", "maps", "--seed", "2", "--count", "1", "--noise", "0", "--out", &data];
+    for (args, file, kilobytes) in [(&benching[..], "random-0.json", 2), (&making[..], "shard-00000.zst", 4)] {
+        let (status, said) = ends(with_small_files(kilobytes, args));
         let complaints = complaints(&said);
         assert_eq!(status.code(), Some(2), "{said}");
         assert!(complaints.len() == 1 && complaints[0].contains(&format!("{file}: File too large")), "{said}");
@@ -186,8 +186,8 @@ fn a_disk_that_fills_up_ends_a_bench_and_making_data_with_one_line() {
     assert!(!folder.path("bench/episodes/set/tin/random-0.json").exists(), "half-written");
     assert!(!folder.path("data/shard-00000.zst").exists() && !folder.path("data/shard-00000.json").exists());
     // With room both go on.
-    nudge_ok(&bench_of(&set));
-    nudge_ok(&data_of);
+    nudge_ok(&benching);
+    nudge_ok(&making);
 }
 
 #[test]

@@ -5,8 +5,8 @@
 #
 #   scripts/faults.sh [ERROR]...        ENOSPC EIO EACCES EINTR unless told
 #
-# Needs strace (Debian: apt install strace). The program is NUDGE, else the one that `make headless` builds. Ends with 1 if
-# anything fell.
+# Needs strace (Debian: apt install strace). The program is NUDGE, else the one that `make headless` builds; FAULTS_CALLS names
+# the operations where not all are wanted. Ends with 1 if anything fell.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 nudge=${NUDGE:-${CARGO_TARGET_DIR:-target}/release/nudge}
@@ -48,7 +48,7 @@ done < <(cd "$folder/whole" && find . -type f -printf '%P\n')
 
 fell=0
 printf '%-10s %-8s %10s %10s %10s %10s\n' operation error injected 'went on' 'exit 2' fell
-for call in openat write rename mkdir unlink flock; do
+for call in ${FAULTS_CALLS:-openat write rename mkdir unlink flock}; do
     for error in "${errors[@]}"; do
         injected=0 went_on=0 refused=0 fallen=0
         # The nth such call of any thread, until no thread has so many.

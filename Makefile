@@ -96,7 +96,7 @@ test-window: workbench-build python
 fuzz: export NUDGE_FUZZ ?= 1000000
 fuzz: export NUDGE_FUZZ_SECONDS ?= 3600
 fuzz: headless
-	NUDGE_BIN=$(NUDGE) $(CARGO) test --release --locked --no-fail-fast -p nudge-tests --test fuzz -- --nocapture --test-threads 1
+	NUDGE_BIN=$(NUDGE) $(CARGO) test --release --locked --no-fail-fast --workspace --test fuzz -- --nocapture --test-threads 1
 
 kills: headless
 	NUDGE=$(NUDGE) scripts/kills.sh

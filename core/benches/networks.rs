@@ -2,6 +2,10 @@
 //!
 //! Medians of wall-clock time with all threads; a target is for two idle cores.
 
+#[path = "support/median.rs"]
+mod median;
+
+use median::median;
 use nudge_core::arm::ArmTool;
 use nudge_core::belief::{Belief, SweptPush};
 use nudge_core::camera::{ViewArray, project, render};
@@ -9,9 +13,7 @@ use nudge_core::cnabu;
 use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng::stream;
 use nudge_core::scene::{Catalog, Scene};
-use std::hint::black_box;
 use std::path::Path;
-use std::time::Instant;
 
 /// Candidates that a decision weighs.
 const CANDIDATES: usize = 80;
@@ -48,16 +50,4 @@ fn main() {
 
 fn row(what: &str, seconds: f64, target: f64) {
     println!("{what:<50} {seconds:>8.3} s (target {target})");
-}
-
-fn median<T>(runs: usize, mut work: impl FnMut() -> T) -> f64 {
-    let mut seconds: Vec<f64> = (0..runs)
-        .map(|_| {
-            let started = Instant::now();
-            black_box(work());
-            started.elapsed().as_secs_f64()
-        })
-        .collect();
-    seconds.sort_by(f64::total_cmp);
-    seconds[runs / 2]
 }

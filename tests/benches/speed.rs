@@ -2,6 +2,10 @@
 //!
 //! Each figure is the median of a few runs on this machine as it is; a target is for two idle cores.
 
+#[path = "../../core/benches/support/median.rs"]
+mod median;
+
+use median::median;
 use nudge_core::arm::{ArmTool, Push, PushMotion};
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, ViewId, project, render};
@@ -12,7 +16,6 @@ use nudge_core::rng::stream;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::world::{TruthMap, World};
 use nudge_tests::{nudge_bin, root};
-use std::hint::black_box;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
@@ -56,19 +59,6 @@ fn main() {
     row("decision after 5 steps: 300 views, pairs, 80 pushes", median(5, || episode.decide()), None);
 
     whole_episode();
-}
-
-/// The median wall-clock time of `runs` runs, seconds.
-fn median<T>(runs: usize, mut work: impl FnMut() -> T) -> f64 {
-    let mut seconds: Vec<f64> = (0..runs)
-        .map(|_| {
-            let started = Instant::now();
-            black_box(work());
-            started.elapsed().as_secs_f64()
-        })
-        .collect();
-    seconds.sort_by(f64::total_cmp);
-    seconds[runs / 2]
 }
 
 fn row(what: &str, seconds: f64, target: Option<f64>) {

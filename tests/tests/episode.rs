@@ -54,9 +54,14 @@ fn two_runs_agree_and_replay_verifies_them() {
         assert_eq!(step["index"].as_u64(), Some(at as u64 + 1));
         assert_eq!(step["decision"]["gains"].as_array().map(Vec::len), Some(300));
         assert!(step["scores"]["occupancy_iou"].as_f64().expect("score") > 0.0);
-        assert!(step["seconds"]["decide"].as_f64().expect("seconds") >= 0.0);
+        // To weigh 300 views takes time on any machine, and no step of this scene takes a minute.
+        let decided_s = step["seconds"]["decide"].as_f64().expect("seconds");
+        assert!(decided_s > 1e-4 && decided_s < 60.0, "step {}: {decided_s} s", at + 1);
+        assert_eq!(step["action"], step["decision"]["action"]);
         let kind = step["action"]["kind"].as_str().expect("kind");
-        assert!(if at < 3 { kind == "look" } else { kind == "look" || kind == "push" }, "step {}: {kind}", at + 1);
+        // Nothing is pushed in the first three steps and in the last, and one look at least follows a push.
+        let may_push = at >= 3 && at + 1 < 6 && steps[at - 1]["action"]["kind"] == "look";
+        assert!(kind == "look" || (kind == "push" && may_push), "step {}: {kind}", at + 1);
     }
     let made_by = &first["made_by"];
     let is_hash = |value: &Value, digits: usize| {

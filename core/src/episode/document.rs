@@ -34,6 +34,10 @@ impl EpisodeRecord {
             None => return Err(Error::input(path, "format", "is missing: not an episode")),
         }
         let mut record: Self = serde_json::from_str(text).map_err(|error| input_error(path, &error))?;
+        record.scene.check_numbers(path)?;
+        if let Err(fault) = record.config.planner.check() {
+            return Err(Error::input(path, "planner", fault.to_string()));
+        }
         for (at, step) in record.steps.iter().enumerate() {
             if step.index != at + 1 {
                 let place = format!("steps[{at}].index");

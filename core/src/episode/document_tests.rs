@@ -72,6 +72,33 @@ fn an_action_that_is_not_the_decision_s_is_refused() {
     assert_eq!(error, "e.json: steps[0].action: is not the action of its decision");
 }
 
+/// What is said of the document with one value in another's place.
+fn refusal(place: &str, value: Value) -> String {
+    let mut document: Value = serde_json::from_str(&synthetic::record(2).to_json()).expect("JSON");
+    *document.pointer_mut(place).unwrap_or_else(|| panic!("{place} is not there")) = value;
+    EpisodeRecord::from_json(&document.to_string(), Path::new("e.json")).expect_err("refuses").to_string()
+}
+
+#[test]
+fn a_shelf_of_kilometres_in_an_episode_asked_for_all_memory() {
+    for size in [1e6, 1e30] {
+        let line = refusal("/scene/shelf/size", serde_json::json!([size, 0.4, 0.4]));
+        assert!(line.starts_with("e.json: shelf size "), "{line}");
+    }
+    let line = refusal("/scene/shelf/voxel_m", 1e-9.into());
+    assert!(line.contains("voxel_m = "), "{line}");
+    let line = refusal("/scene/robot/base", serde_json::json!([0.0, 1e30, 0.0]));
+    assert!(line.contains("robot base"), "{line}");
+}
+
+#[test]
+fn settings_out_of_range_in_an_episode_were_taken() {
+    let line = refusal("/planner/candidates", u64::MAX.into());
+    assert!(line.starts_with("e.json: planner: --candidates "), "{line}");
+    let line = refusal("/planner/quiet_steps", 100_000.into());
+    assert!(line.contains("--quiet-steps 100000: must be 0 to 1000"), "{line}");
+}
+
 proptest! {
     #[test]
     fn every_number_is_read_back_to_the_bit(

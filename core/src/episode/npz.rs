@@ -7,6 +7,7 @@
 use crate::belief::Belief;
 use crate::grid::Grid;
 use crate::scene::CLASS_COUNT;
+use crate::wall::guarded;
 use crate::world::TruthMap;
 use crate::{Error, Result};
 use half::f16;
@@ -14,8 +15,13 @@ use half::slice::HalfFloatSliceExt;
 use npyz::WriterBuilder;
 use npyz::zip::write::FileOptions;
 use npyz::zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
-use std::io::{Cursor, Read, Write};
+use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
+
+/// No header of a `.npy` is longer, bytes.
+const MAX_NPY_HEADER: u64 = 1 << 16;
+/// No number of a `.npy` that is read is longer, bytes.
+const LARGEST_NUMBER: u64 = 8;
 
 /// How a belief's evidence is kept in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,13 +121,17 @@ pub fn read_truth(bytes: &[u8], path: &Path, grid: Grid) -> Result<StoredTruth> 
 /// Checks that the file is a whole archive with the named arrays, without reading them.
 pub fn check_archive(path: &Path, arrays: &[&str]) -> Result<()> {
     let file = std::fs::File::open(path).map_err(|error| Error::io(path, error))?;
-    let mut zip = ZipArchive::new(std::io::BufReader::new(file))
-        .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))?;
+    let mut zip = opened(std::io::BufReader::new(file), path)?;
     for name in arrays {
         zip.by_name(&npyz::npz::file_name_from_array_name(name))
             .map_err(|error| Error::input(path, format!("array {name}"), error.to_string()))?;
     }
     Ok(())
+}
+
+fn opened<R: Read + Seek>(from: R, path: &Path) -> Result<ZipArchive<R>> {
+    guarded(|| ZipArchive::new(from).map_err(|error| error.to_string()))
+        .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))
 }
 
 /// An archive being written into memory.
@@ -167,18 +177,21 @@ struct OpenArchive<'a> {
 
 impl<'a> OpenArchive<'a> {
     fn new(bytes: &'a [u8], path: &'a Path) -> Result<Self> {
-        let zip = ZipArchive::new(Cursor::new(bytes))
-            .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))?;
-        Ok(Self { zip, path })
+        Ok(Self { zip: opened(Cursor::new(bytes), path)?, path })
     }
 
-    /// The bytes of an array's `.npy`, checksum verified.
-    fn entry(&mut self, name: &str) -> Result<Vec<u8>> {
+    /// The bytes of an array's `.npy`, checksum verified. An archive may promise more than memory holds: no more is
+    /// unpacked than an array of so many numbers can have.
+    fn entry(&mut self, name: &str, numbers: usize) -> Result<Vec<u8>> {
         let fail = |message: String| Error::input(self.path, format!("array {name}"), message);
-        let mut entry =
+        let entry =
             self.zip.by_name(&npyz::npz::file_name_from_array_name(name)).map_err(|error| fail(error.to_string()))?;
+        let most = MAX_NPY_HEADER + LARGEST_NUMBER * numbers as u64;
         let mut npy = Vec::new();
-        entry.read_to_end(&mut npy).map_err(|error| fail(error.to_string()))?;
+        entry.take(most + 1).read_to_end(&mut npy).map_err(|error| fail(error.to_string()))?;
+        if npy.len() as u64 > most {
+            return Err(fail(format!("has more than the {numbers} numbers that the scene's grid needs")));
+        }
         Ok(npy)
     }
 
@@ -189,9 +202,9 @@ impl<'a> OpenArchive<'a> {
         shape: &[usize],
         read: impl FnOnce(npyz::NpyFile<&[u8]>) -> std::io::Result<T>,
     ) -> Result<T> {
-        let npy = self.entry(name)?;
+        let npy = self.entry(name, shape.iter().product())?;
         let fail = |message: String| Error::input(self.path, format!("array {name}"), message);
-        let file = npyz::NpyFile::new(&npy[..]).map_err(|error| fail(error.to_string()))?;
+        let file = guarded(|| npyz::NpyFile::new(&npy[..]).map_err(|error| error.to_string())).map_err(fail)?;
         let found: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
         if found != shape {
             return Err(fail(format!("has shape {found:?} where the scene's grid needs {shape:?}")));
@@ -199,7 +212,7 @@ impl<'a> OpenArchive<'a> {
         if file.order() != npyz::Order::C {
             return Err(fail("is in Fortran order".to_owned()));
         }
-        read(file).map_err(|error| fail(error.to_string()))
+        guarded(|| read(file).map_err(|error| error.to_string())).map_err(fail)
     }
 
     fn bytes(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u8>> {
@@ -221,5 +234,26 @@ impl<'a> OpenArchive<'a> {
             return Err(Error::input(path, place, format!("entry {at} is {}, not evidence", values[at])));
         }
         Ok((values, precision))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_archive_that_unpacks_to_more_than_its_grid_filled_the_memory() {
+        let grid = Grid { voxel_m: 0.01, dims: [4, 3, 2], origin: [0.0; 3] };
+        let mut archive = Archive::new();
+        archive.add("occupancy", &[4, 3, 2, 2], &[1.0_f32; 48]);
+        archive.add("semantics", &[4, 3, CLASS_COUNT], &[1.0_f32; 12 * CLASS_COUNT]);
+        assert!(read_belief(&archive.finish(), Path::new("a.npz"), grid).is_ok());
+        // A thousandth of it on the disk.
+        let mut archive = Archive::new();
+        archive.add("occupancy", &[48 << 17], &vec![0.0_f32; 48 << 17]);
+        let bytes = archive.finish();
+        assert!(bytes.len() < 1 << 18);
+        let line = read_belief(&bytes, Path::new("a.npz"), grid).expect_err("refuses").to_string();
+        assert_eq!(line, "a.npz: array occupancy: has more than the 48 numbers that the scene's grid needs");
     }
 }

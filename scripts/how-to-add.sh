@@ -61,6 +61,7 @@ after core/src/plan/policy.rs '    Saturation,' $'    /// Scratch.\n    Scratch,
 after core/src/plan/policy.rs '        Self::Saturation,' '        Self::Scratch,'
 after core/src/plan/policy.rs 'Self::Saturation =>' '            Self::Scratch => "scratch",'
 after core/src/plan/decide.rs 'PolicyKind::MemNoPush => (),' '        PolicyKind::Scratch => (),'
+change core/src/plan/because.rs 'PolicyKind::MemNoPush =>' 'PolicyKind::MemNoPush | PolicyKind::Scratch =>'
 after app/src/report/palette.rs 'PolicyKind::Saturation =>' '        PolicyKind::Scratch => ([0, 0, 0], [1.0, 1.0]),'
 end
 
@@ -68,7 +69,7 @@ begin 'a planner setting' quiet_steps ''
 after core/src/plan/settings.rs 'planner_settings! {' \
     $'    scratch: usize = [3, 3], Thresholds, "scratch", "scratch", "steps", "N",\n        (whole 0 to 1000),\n        "Scratch";'
 change core/src/plan/rule.rs 'step < settings.quiet_steps' 'step < settings.quiet_steps.max(settings.scratch)'
-change app/src/workbench/panels/decision.rs 'planner.quiet_steps' 'planner.quiet_steps.max(planner.scratch)'
+change core/src/plan/because.rs 'settings.quiet_steps' 'settings.quiet_steps.max(settings.scratch)'
 end
 
 begin 'a belief update' classical core/src/belief/scratch.rs

@@ -12,10 +12,12 @@ mod settings;
 mod weigh;
 
 pub use decide::decide;
+pub(crate) use look::gains_and_pair;
 pub use look::{gain_field, gain_sources};
 pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
+pub(crate) use weigh::coarse;
 pub use weigh::{COARSE_VIEWS, disturbance, draw_pushes, push_sources};
 
 use crate::arm::{ArmTool, Push, PushMotion};

@@ -50,7 +50,7 @@ pub(super) fn gains(field: &GainField, array: &ViewArray, ids: &[ViewId], densit
 }
 
 /// Gain of every given view, nats, in the order of `ids` (those of the array), and the best pair of those offered.
-pub(super) fn gains_and_pair(
+pub(crate) fn gains_and_pair(
     field: &GainField,
     array: &ViewArray,
     ids: &[ViewId],

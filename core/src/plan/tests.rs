@@ -179,6 +179,7 @@ impl Table {
             jammed: false,
             dropped: Vec::new(),
             toppled: Vec::new(),
+            shown: Vec::new(),
         }
     }
 

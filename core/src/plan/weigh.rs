@@ -121,7 +121,7 @@ pub(super) fn weigh_clairvoyantly(
 }
 
 /// The views that rank the candidates, of those that are offered.
-fn coarse(offered: &[ViewId]) -> Vec<ViewId> {
+pub(crate) fn coarse(offered: &[ViewId]) -> Vec<ViewId> {
     offered.iter().copied().step_by((offered.len() / COARSE_VIEWS).max(1)).collect()
 }
 

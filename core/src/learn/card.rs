@@ -96,10 +96,10 @@ pub struct WorthCard {
     pub followed_share: f32,
     /// Name of the belief update.
     pub belief: String,
-    /// Weights of its networks, none for an update without any.
-    pub weights: Weights,
     /// What a record holds, in order.
     pub record: Vec<String>,
+    /// Weights of its networks, none for an update without any.
+    pub weights: Weights,
 }
 
 /// Views in a sample of a kind.

@@ -249,6 +249,19 @@ mod tests {
         assert!(!truth.opened.contains(at(-0.04, 0.23)) && !truth.opened.contains(at(-0.085, 0.16)));
         assert!(truth.opened.len() > 200, "{}", truth.opened.len());
 
+        // The same as by looking at everything anew.
+        let (mut pushed, owners_of) = (world.clone(), |bodies: &[Body]| TruthMap::owners(&grid, bodies));
+        pushed.execute(&arm.arm, &aside);
+        let anew = TrueReach::new(&grid, &TruthMap::of(&grid, &pushed.bodies()), &views, REACH_DENSITY);
+        assert_eq!(truth.shown, anew.shown(&owners_of(&pushed.bodies()), 3));
+        assert_eq!(crate::camera::hidden_objects(pushed.shelf(), &pushed.bodies(), &views), [ObjectId(2)]);
+        let [appeared, vanished] = truth.appeared_and_vanished(known.shown());
+        assert!(appeared > 20 && vanished > 20, "{appeared} {vanished}");
+        let mut opened = anew.reached();
+        opened.subtract(&known.reach.reached());
+        opened.subtract(&known.known);
+        assert!(truth.opened == opened);
+
         // What was seen already is not opened; half of the shelf as if it had been.
         let mut left = nothing.clone();
         (0..grid.voxel_count()).filter(|at| grid.center(grid.voxel(*at)).x < 0.0).for_each(|at| left.insert(at));

@@ -119,3 +119,82 @@ fn is_there(directory: &Path, number: usize) -> bool {
     shard::verified_index(directory, number)
         .is_ok_and(|index| index.samples.iter().map(|entry| entry.number).eq([number]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::ArmTool;
+    use crate::belief::Classical;
+    use crate::camera::ViewArray;
+    use crate::learn::worth::{WorthState, summarise};
+    use crate::learn::{Dataset, Recipe, Stretch};
+    use crate::scene::{Catalog, Family, GenerateConfig};
+    use std::sync::Arc;
+
+    fn recipe() -> WorthRecipe {
+        let scenes = GenerateConfig::default();
+        let base = Recipe {
+            catalog: Catalog::standard(),
+            arm: Arc::new(ArmTool::standard(scenes.shelf)),
+            scenes,
+            views: ViewArray::named("real75").expect("shipped"),
+            noise_share: 0.5,
+            stretch: Stretch::default(),
+        };
+        let families = vec![Family::Walls, Family::TallFirst];
+        WorthRecipe { base, families, update: Arc::new(Classical), pushes: 4, followed_share: 0.5 }
+    }
+
+    fn make(recipe: &WorthRecipe, count: usize, directory: &Path, threads: usize) -> WorthProgress {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let card = Card::of_worth(recipe, 4, count);
+        pool.install(|| make_worth(&card, recipe, directory, Shard::default(), &|_| ())).expect("made")
+    }
+
+    #[test]
+    fn states_are_the_same_on_any_number_of_threads_and_after_a_loss() {
+        let (recipe, dir) = (recipe(), tempfile::tempdir().expect("tempdir"));
+        let [one, other] = ["one", "other"].map(|name| dir.path().join(name));
+        let bytes = |directory: &Path, number: usize| std::fs::read(shard::path(directory, number)).expect("a state");
+        let made = make(&recipe, 6, &one, 1);
+        assert_eq!((made.done, made.of, made.made), (6, 6, 6));
+        let kept: Vec<Vec<u8>> = (0..6).map(|number| bytes(&one, number)).collect();
+
+        // Three threads, in two calls, of which the second makes what the first one left out.
+        make(&recipe, 3, &other, 3);
+        assert_eq!(make(&recipe, 6, &other, 3).made, 3);
+        assert!((0..6).all(|number| bytes(&other, number) == kept[number]));
+
+        // A state that is lost, and one that is damaged, are made again; nothing else is.
+        std::fs::remove_file(shard::index_path(&one, 2)).expect("removed");
+        std::fs::write(shard::path(&one, 5), b"cut").expect("written");
+        let again = make(&recipe, 6, &one, 2);
+        assert_eq!((again.done, again.made), (6, 2));
+        assert!((0..6).all(|number| bytes(&one, number) == kept[number]));
+
+        let data = Dataset::<WorthState>::open(&one).expect("data");
+        let states: Vec<WorthState> = (0..6).map(|at| data.get(at).expect("a state")).collect();
+        assert_eq!(states.iter().map(|state| state.leg).collect::<Vec<_>>(), [0, 1, 2, 3, 0, 1]);
+        for state in &states {
+            let record = state.to_bytes();
+            // Scores that were not found are not a number, which equals nothing.
+            assert_eq!(WorthState::from_bytes(&data.grid(), &record).expect("a record").to_bytes(), record);
+            assert!(WorthState::from_bytes(&data.grid(), &record[..record.len() - 1]).is_none());
+            assert!(
+                state.pushes.len() <= 4 && state.pushes.iter().all(|push| push.objects.len() == state.objects.len())
+            );
+        }
+        assert!(states.windows(2).all(|pair| pair[1].leg == 0 || pair[1].looks.starts_with(&pair[0].looks)));
+        let pushes: Vec<_> = states.iter().flat_map(|state| &state.pushes).collect();
+        assert!(pushes.len() >= 6 && pushes.iter().any(|push| push.displacement_m > 0.0), "{}", pushes.len());
+        assert!(pushes.iter().all(|push| push.swept.iter().any(|byte| *byte != 0)));
+        let summaries = summarise(&data, &mut |_| ()).expect("summaries");
+        assert_eq!((summaries[0].states, summaries[0].pushes), (6, pushes.len()));
+        assert!(summaries[0].best >= summaries[0].chosen && summaries[0].best >= summaries[0].random);
+
+        let card = Card::of_worth(&WorthRecipe { pushes: 5, ..recipe.clone() }, 4, 6);
+        let refused = make_worth(&card, &recipe, &one, Shard::default(), &|_| ()).expect_err("other settings");
+        assert_eq!(refused.exit_code(), 2);
+        assert!(refused.to_string().contains("pushes per state 4, not 5"), "{refused}");
+    }
+}

@@ -78,7 +78,7 @@ impl<'a> Rollout<'a> {
         let mut rng = stream(seed, "worth episode", 0);
         let family = recipe.families[rng.random_range(0..recipe.families.len())];
         let noisy = rng.random::<f32>() < base.noise_share;
-        let random_looks = [0.0, 0.0, 0.5, 1.0][rng.random_range(0..4)];
+        let random_looks = [0.0, 0.0, 0.5, 1.0][rng.random_range(0..4_usize)];
         let scenes = GenerateConfig { fill: family.fill(), rho: family.rho(), family, ..base.scenes.clone() };
         let world = Recipe { scenes, ..base.clone() }.world(seed)?;
         let grid = base.grid();

@@ -30,12 +30,14 @@ mod considered;
 mod follow;
 mod make;
 mod measure;
+mod planes;
 mod record;
 mod rollout;
 mod state;
 mod summary;
 
 pub use make::{WorthProgress, make_worth};
+pub use planes::{PUSH_PLANES, PlaneScale, Planes, STATE_PLANES, push_planes, state_planes};
 pub use record::LAYOUT;
 pub use state::{
     BANDS, BeliefMap, FloorFacts, Followed, MapScores, ObjectOutcome, ObjectState, Promise, WorthPush, WorthState,

@@ -126,7 +126,9 @@ mod tests {
     use crate::arm::ArmTool;
     use crate::belief::Classical;
     use crate::camera::ViewArray;
-    use crate::learn::worth::{WorthState, summarise};
+    use crate::learn::worth::{
+        PUSH_PLANES, PlaneScale, Planes, STATE_PLANES, WorthState, push_planes, state_planes, summarise,
+    };
     use crate::learn::{Dataset, Recipe, Stretch};
     use crate::scene::{Catalog, Family, GenerateConfig};
     use std::sync::Arc;
@@ -185,6 +187,17 @@ mod tests {
             );
         }
         assert!(states.windows(2).all(|pair| pair[1].leg == 0 || pair[1].looks.starts_with(&pair[0].looks)));
+        let grid = data.grid();
+        for state in &states {
+            for (scale, size) in [(PlaneScale::Fine, [80, 40]), (PlaneScale::Coarse, [40, 20])] {
+                let planes = state_planes(&grid, state, scale);
+                assert_eq!((planes.count(), planes.size), (STATE_PLANES, size));
+                let of_pushes: Vec<Planes> = state.pushes.iter().map(|push| push_planes(&grid, push, scale)).collect();
+                assert!(of_pushes.iter().all(|planes| (planes.count(), planes.size) == (PUSH_PLANES, size)));
+                let values = of_pushes.iter().chain([&planes]).flat_map(|planes| &planes.values);
+                assert!(values.into_iter().all(|value| (-1.0..=1.0).contains(value)));
+            }
+        }
         let pushes: Vec<_> = states.iter().flat_map(|state| &state.pushes).collect();
         assert!(pushes.len() >= 6 && pushes.iter().any(|push| push.displacement_m > 0.0), "{}", pushes.len());
         assert!(pushes.iter().all(|push| push.swept.iter().any(|byte| *byte != 0)));

@@ -12,6 +12,7 @@ use crate::rng::stream;
 use crate::scene::{Family, GenerateConfig};
 use crate::world::World;
 use rand::Rng;
+use std::cell::OnceCell;
 
 /// Chance of a push before a state, the first one left out.
 const PUSH_CHANCE: f32 = 0.6;
@@ -69,6 +70,8 @@ pub(super) struct Rollout<'a> {
     /// Chance that a look is a random one.
     random_looks: f32,
     actions: u64,
+    /// [`Self::best_views`], once it is known.
+    best: OnceCell<(Option<ViewPair>, f32)>,
 }
 
 impl<'a> Rollout<'a> {
@@ -98,6 +101,7 @@ impl<'a> Rollout<'a> {
             unreachable: base.views.unreachable(&hands),
             random_looks,
             actions: 0,
+            best: OnceCell::new(),
         })
     }
 
@@ -109,6 +113,10 @@ impl<'a> Rollout<'a> {
 
     /// The best two views, as the planner would choose them, and what they promise together, nats.
     pub fn best_views(&self) -> (Option<ViewPair>, f32) {
+        *self.best.get_or_init(|| self.find_best_views())
+    }
+
+    fn find_best_views(&self) -> (Option<ViewPair>, f32) {
         let views = &self.recipe.base.views;
         let field = gain_field(&self.belief, Some(self.sightings.seen()));
         let ids: Vec<ViewId> = views.views.iter().map(|view| view.id).collect();
@@ -150,6 +158,7 @@ impl<'a> Rollout<'a> {
         self.belief = look(&**update, &self.belief, &observation, &mut self.sightings);
         self.used.push(view.id);
         self.looks.push(view.id.0);
+        self.best = OnceCell::new();
     }
 
     /// Makes one of the pushes that are considered, if one is and nothing was dropped before.
@@ -172,6 +181,7 @@ impl<'a> Rollout<'a> {
         self.actions += 1;
         self.pushes += 1;
         self.used.clear();
+        self.best = OnceCell::new();
         self.dropped |= !outcome.dropped.is_empty();
         let swept = SweptPush::done(&considered.pushes[at].swept.push, &outcome, arm, &self.belief.grid);
         let predicted = self.recipe.update.predict_pushes(&self.belief, std::slice::from_ref(&swept));

@@ -224,6 +224,31 @@ pub(super) fn scan<'a>(
 }
 
 impl ProjectedPart {
+    /// Whether this part surely hides the hull of some corners, each given by column and row from the image's centre and by its
+    /// inverse depth: a convex solid stays convex in these coordinates, where every face plane is linear, so the corners tell for
+    /// all of the hull. Planes that the camera is nearly in are not trusted.
+    pub(super) fn covers(&self, corners: &[[f32; 3]]) -> bool {
+        /// By how much the inverse depth must exceed what is to be hidden, 1 / m: far more than rounding.
+        const MARGIN: f32 = 1e-3;
+        /// Largest value of a plane's terms that is trusted, 1 / m.
+        const MOST: f32 = 1e3;
+        let value = |[a, b, c]: &[f32; 3], [u, v, _]: &[f32; 3]| {
+            let terms = [a * u, b * v, *c];
+            terms.iter().all(|term| term.abs() < MOST).then(|| terms.iter().sum::<f32>())
+        };
+        !self.outside.is_empty()
+            && corners.iter().all(|corner| {
+                let mut enter = f32::INFINITY;
+                for plane in &self.outside {
+                    match value(plane, corner) {
+                        Some(w) if w > corner[2] + MARGIN => enter = enter.min(w),
+                        _ => return false,
+                    }
+                }
+                self.inside.iter().all(|plane| value(plane, corner).is_some_and(|w| w + MARGIN < enter))
+            })
+    }
+
     fn new(
         vertices: &[Point],
         faces: &[HalfSpace],

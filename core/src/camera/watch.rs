@@ -1,25 +1,35 @@
 //! Which objects are hidden after some of them have moved, without looking at everything again.
 //!
-//! The answer is that of [`hidden_objects`](super::hidden_objects), pixel for pixel. Three things make it fast:
+//! The answer is that of [`hidden_objects`](super::hidden_objects), pixel for pixel. Four things make it fast:
 //!
 //! * What stands still is projected once per view.
 //! * An object that was seen is looked for first in the view that showed it.
 //! * In a view where nothing that stood before an object has moved, no more of it can show than before: an object that was
 //!   hidden and stands still is looked for only in views where something that has moved was drawn over its outline.
+//! * What one convex part alone hides is not drawn ([`ProjectedPart::covers`]).
 
 use super::render::{ProjectedPart, ProjectedScene, Rect, RowBuffer, project_body, scan};
 use super::visibility::UNSEEN_PX;
 use super::{View, ViewArray};
 use crate::scene::{Body, ObjectId, Shelf};
+use crate::solid::{Bounds, ConvexPart};
+use crate::{Point, Pose, Vector};
 use rayon::prelude::*;
 
 /// So many views are passed over between two that are tried one after the other: neighbours see the same things.
 const STRIDE: usize = 37;
 
+/// How much larger than its part a box is to every side, metres.
+const GROWN_M: f32 = 0.001;
+/// Nearer to the camera's plane than this, a corner has no place in the image, metres.
+const NEAREST_M: f32 = 1e-2;
+
 /// Bodies as all views of an array see them.
 pub struct HiddenWatch<'a> {
     views: &'a ViewArray,
     bodies: Vec<Body>,
+    /// Per body, boxes around its parts, in its frame, a little larger than these.
+    boxes: Vec<Vec<Bounds>>,
     /// Per view.
     scenes: Vec<ProjectedScene>,
     /// The order in which views are tried.
@@ -44,6 +54,7 @@ impl<'a> HiddenWatch<'a> {
         let mut watch = Self {
             views,
             bodies: bodies.to_vec(),
+            boxes: bodies.iter().map(boxes).collect(),
             scenes: views.views.par_iter().map(project).collect(),
             order: order(count),
             witness: Vec::new(),
@@ -51,7 +62,11 @@ impl<'a> HiddenWatch<'a> {
         let nothing = vec![false; bodies.len()];
         let finds = |body| {
             let buffer = &mut RowBuffer::new(views.intrinsics.width);
-            watch.order.iter().copied().find(|view| watch.shows(body, *view, &nothing, &[], buffer))
+            watch
+                .order
+                .iter()
+                .copied()
+                .find(|view| watch.shows([body, *view], &bodies[body].world_from_body, &nothing, &[], buffer))
         };
         watch.witness = (0..bodies.len()).into_par_iter().map(finds).collect();
         watch
@@ -75,15 +90,13 @@ impl<'a> HiddenWatch<'a> {
         let mut seen_from: Vec<Option<Changed>> = self.scenes.iter().map(|_| None).collect();
         let mut hidden = Vec::new();
         for (at, body) in self.bodies.iter().enumerate() {
-            if now[at].is_none() {
-                continue;
-            }
+            let Some(here) = now[at] else { continue };
             let mut shows = |view: usize, only_if_bared: bool| {
                 let seen = seen_from[view].get_or_insert_with(|| self.changed_in(view, &changed, &now));
                 if only_if_bared && !self.is_bared(at, view, seen) {
                     return false;
                 }
-                self.shows(at, view, &changed, &seen.now, &mut buffer)
+                self.shows([at, view], &here.world_from_body, &changed, &seen.now, &mut buffer)
             };
             let found = match self.witness[at] {
                 Some(view) => {
@@ -120,14 +133,25 @@ impl<'a> HiddenWatch<'a> {
         outline.is_some_and(|outline| seen.before.iter().any(|rect| rect.meets(&outline)))
     }
 
-    /// Whether a view shows [`UNSEEN_PX`] pixels or more of a body, when those that have changed are drawn as `now`.
-    fn shows(&self, body: usize, view: usize, changed: &[bool], now: &[ProjectedPart], buffer: &mut RowBuffer) -> bool {
+    /// Whether a view shows [`UNSEEN_PX`] pixels or more of a body that is at a pose, when those that have changed are drawn
+    /// as `now`.
+    fn shows(
+        &self,
+        [body, view]: [usize; 2],
+        world_from_body: &Pose,
+        changed: &[bool],
+        now: &[ProjectedPart],
+        buffer: &mut RowBuffer,
+    ) -> bool {
         let scene = &self.scenes[view];
         let stays = |part: &&ProjectedPart| !changed.get(usize::from(part.tag)).is_some_and(|changed| *changed);
         let parts = || scene.parts.iter().filter(stays).chain(now);
         let outline = parts().filter(|part| usize::from(part.tag) == body).map(|part| part.rect.clone());
         let Some(outline) = outline.reduce(|a, b| a.union(&b)) else { return false };
         let mut near: Vec<&ProjectedPart> = parts().filter(|part| part.rect.meets(&outline)).collect();
+        if self.is_covered([body, view], world_from_body, &near) {
+            return false;
+        }
         // As they would be projected together: the shelf, then the bodies in their order.
         near.sort_by_key(|part| part.tag.wrapping_add(1));
         let [least, most] = self.views.intrinsics.depth_range_m;
@@ -143,6 +167,38 @@ impl<'a> HiddenWatch<'a> {
         }
         false
     }
+
+    /// Whether each part of a body is hidden by one part of another alone.
+    fn is_covered(&self, [body, view]: [usize; 2], world_from_body: &Pose, near: &[&ProjectedPart]) -> bool {
+        let camera_from_body = self.views.views[view].world_from_camera.inverse() * world_from_body;
+        let others = || near.iter().filter(|part| usize::from(part.tag) != body);
+        self.boxes[body].iter().all(|bounds| {
+            corners(bounds, &camera_from_body, self.views.intrinsics.focal_px)
+                .is_some_and(|corners| others().any(|part| part.covers(&corners)))
+        })
+    }
+}
+
+/// Boxes around a body's parts, in its frame.
+fn boxes(body: &Body) -> Vec<Bounds> {
+    let grown = Vector::repeat(GROWN_M);
+    let around = |part: &ConvexPart| Bounds::around(part.vertices.iter().copied());
+    let boxes = body.solid.parts.iter().filter_map(around);
+    boxes.map(|bounds| Bounds { min: bounds.min - grown, max: bounds.max + grown }).collect()
+}
+
+/// The corners of a box by column and row from the image's centre and inverse depth; `None` if one is not before the camera.
+fn corners(bounds: &Bounds, camera_from_box: &Pose, focal_px: f32) -> Option<[[f32; 3]; 8]> {
+    let mut corners = [[0.0; 3]; 8];
+    for (at, corner) in corners.iter_mut().enumerate() {
+        let pick = |axis: usize| if at >> axis & 1 == 1 { bounds.max[axis] } else { bounds.min[axis] };
+        let seen = camera_from_box * Point::new(pick(0), pick(1), pick(2));
+        if seen.z < NEAREST_M {
+            return None;
+        }
+        *corner = [focal_px * seen.x / seen.z, focal_px * seen.y / seen.z, 1.0 / seen.z];
+    }
+    Some(corners)
 }
 
 /// All of `count` views, neighbours far apart.
@@ -157,7 +213,6 @@ mod tests {
     use crate::rng::stream;
     use crate::scene::{Catalog, Family, GenerateConfig, generate};
     use crate::world::World;
-    use crate::{Pose, Vector};
     use rand::Rng;
 
     #[test]

@@ -11,6 +11,7 @@
 pub(crate) mod blueprint;
 pub(crate) mod decision;
 mod disk;
+pub(crate) mod eye;
 mod floor;
 mod gain;
 pub(crate) mod layout;

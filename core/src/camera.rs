@@ -10,11 +10,13 @@ mod reach;
 mod render;
 mod views;
 mod visibility;
+mod watch;
 
 pub use noise::NoiseModel;
 pub use project::project;
 pub use render::render;
 pub use visibility::{ObjectVisibility, UNSEEN_PX, hidden_count, hidden_objects, hidden_objects_while, visibility};
+pub use watch::HiddenWatch;
 
 use crate::grid::VoxelSet;
 use crate::{Point, Pose, Vector};

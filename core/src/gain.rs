@@ -47,7 +47,7 @@ pub use cover::{CELL_M, Coverage};
 pub use field::GainField;
 pub use open::{Openings, gain_together};
 pub use pair::{ViewPair, best_pair};
-pub use reach::TrueReach;
+pub use reach::{ReachAfter, TrueReach};
 pub use rescore::RayGains;
 
 use crate::camera::{ViewArray, ViewId};

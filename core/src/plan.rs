@@ -23,6 +23,7 @@ pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
 pub use weigh::{disturbance, draw_pushes};
+pub(crate) use worth::coarse;
 pub use worth::{COARSE_VIEWS, Sources};
 
 use crate::arm::{ArmTool, Push, PushMotion};

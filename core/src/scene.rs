@@ -23,7 +23,7 @@ pub use body::{Body, ObjectId, Shelf};
 pub use catalog::{BACKGROUND, Background, CLASS_COUNT, Catalog, Class, ClassId, OBJECT_CLASS_COUNT};
 pub use check::{MAX_OBJECTS, MAX_VOXELS, Problem};
 pub use file::FORMAT;
-pub use generate::{GenerateConfig, generate};
+pub use generate::{Family, GenerateConfig, generate};
 pub(crate) use mesh::read_mesh_points;
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, Unit, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;

@@ -69,6 +69,16 @@ pub(super) struct Rect {
 }
 
 impl Rect {
+    pub(super) fn is_empty(&self) -> bool {
+        self.columns.is_empty() || self.rows.is_empty()
+    }
+
+    /// Whether two rectangles have a pixel in common.
+    pub(super) fn meets(&self, other: &Self) -> bool {
+        let meet = |a: &Range<usize>, b: &Range<usize>| a.start.max(b.start) < a.end.min(b.end);
+        meet(&self.columns, &other.columns) && meet(&self.rows, &other.rows)
+    }
+
     pub(super) fn union(self, other: &Self) -> Self {
         let hull = |a: Range<usize>, b: &Range<usize>| {
             if a.is_empty() {
@@ -81,6 +91,17 @@ impl Rect {
         };
         Self { columns: hull(self.columns, &other.columns), rows: hull(self.rows, &other.rows) }
     }
+}
+
+/// The parts of a body as a camera sees them, those outside its image included.
+pub(super) fn project_body(
+    body: &Body,
+    tag: u16,
+    camera_from_body: &Pose,
+    intrinsics: &Intrinsics,
+) -> impl Iterator<Item = ProjectedPart> {
+    let Solid { parts } = body.solid.as_ref();
+    parts.iter().map(move |part| ProjectedPart::new(&part.vertices, &part.planes, camera_from_body, intrinsics, tag))
 }
 
 /// A convex part as the camera sees it.
@@ -138,57 +159,96 @@ impl ProjectedScene {
         }
         for (tag, body) in bodies.iter().enumerate() {
             let camera_from_body = camera_from_world * body.world_from_body;
-            let Solid { parts: convex } = body.solid.as_ref();
-            parts.extend(convex.iter().map(|part| {
-                ProjectedPart::new(&part.vertices, &part.planes, &camera_from_body, intrinsics, tag as u16)
-            }));
+            parts.extend(project_body(body, tag as u16, &camera_from_body, intrinsics));
         }
-        parts.retain(|part| !part.rect.columns.is_empty() && !part.rect.rows.is_empty());
+        parts.retain(|part| !part.rect.is_empty());
         Self { parts, center: intrinsics.principal_px() }
     }
 
     /// Finds the first hit of the rays of `columns` in a row, into the same columns of `buffer`.
     pub(super) fn scan(&self, row: usize, columns: Range<usize>, buffer: &mut RowBuffer) {
-        buffer.inverse_depth[columns.clone()].fill(0.0);
-        buffer.tag[columns.clone()].fill(NOTHING);
-        let v = row as f32 + 0.5 - self.center[1];
-        for part in self.parts.iter().filter(|part| part.rect.rows.contains(&row)) {
-            let start = part.rect.columns.start.max(columns.start);
-            let end = part.rect.columns.end.min(columns.end);
-            if start >= end {
-                continue;
+        scan(self.parts.iter(), self.center, row, columns, buffer);
+    }
+
+    /// The image's centre, pixels.
+    pub(super) fn center(&self) -> [f32; 2] {
+        self.center
+    }
+}
+
+/// Finds the first hit of the rays of `columns` in a row among some parts, into the same columns of `buffer`. Of parts that
+/// are hit at the same depth the first counts.
+pub(super) fn scan<'a>(
+    parts: impl Iterator<Item = &'a ProjectedPart>,
+    center: [f32; 2],
+    row: usize,
+    columns: Range<usize>,
+    buffer: &mut RowBuffer,
+) {
+    buffer.inverse_depth[columns.clone()].fill(0.0);
+    buffer.tag[columns.clone()].fill(NOTHING);
+    let v = row as f32 + 0.5 - center[1];
+    for part in parts.filter(|part| part.rect.rows.contains(&row)) {
+        let start = part.rect.columns.start.max(columns.start);
+        let end = part.rect.columns.end.min(columns.end);
+        if start >= end {
+            continue;
+        }
+        let first = start as f32 + 0.5 - center[0];
+        let enter = &mut buffer.enter[..end - start];
+        enter.fill(f32::INFINITY);
+        for [a, b, c] in &part.outside {
+            let base = b * v + c;
+            for (i, enter) in enter.iter_mut().enumerate() {
+                let w = a * (first + i as u32 as f32) + base;
+                *enter = if w < *enter { w } else { *enter };
             }
-            let first = start as f32 + 0.5 - self.center[0];
-            let enter = &mut buffer.enter[..end - start];
-            enter.fill(f32::INFINITY);
-            for [a, b, c] in &part.outside {
-                let base = b * v + c;
-                for (i, enter) in enter.iter_mut().enumerate() {
-                    let w = a * (first + i as u32 as f32) + base;
-                    *enter = if w < *enter { w } else { *enter };
-                }
+        }
+        let leave = &mut buffer.leave[..end - start];
+        // Hits must lie before the camera.
+        leave.fill(f32::MIN_POSITIVE);
+        for [a, b, c] in &part.inside {
+            let base = b * v + c;
+            for (i, leave) in leave.iter_mut().enumerate() {
+                let w = a * (first + i as u32 as f32) + base;
+                *leave = if w > *leave { w } else { *leave };
             }
-            let leave = &mut buffer.leave[..end - start];
-            // Hits must lie before the camera.
-            leave.fill(f32::MIN_POSITIVE);
-            for [a, b, c] in &part.inside {
-                let base = b * v + c;
-                for (i, leave) in leave.iter_mut().enumerate() {
-                    let w = a * (first + i as u32 as f32) + base;
-                    *leave = if w > *leave { w } else { *leave };
-                }
-            }
-            let (best, tags) = (&mut buffer.inverse_depth[start..end], &mut buffer.tag[start..end]);
-            for (((enter, leave), best), tag) in enter.iter().zip(leave.iter()).zip(best).zip(tags) {
-                let hit = *enter >= *leave && *enter > *best;
-                *best = if hit { *enter } else { *best };
-                *tag = if hit { part.tag } else { *tag };
-            }
+        }
+        let (best, tags) = (&mut buffer.inverse_depth[start..end], &mut buffer.tag[start..end]);
+        for (((enter, leave), best), tag) in enter.iter().zip(leave.iter()).zip(best).zip(tags) {
+            let hit = *enter >= *leave && *enter > *best;
+            *best = if hit { *enter } else { *best };
+            *tag = if hit { part.tag } else { *tag };
         }
     }
 }
 
 impl ProjectedPart {
+    /// Whether this part surely hides the hull of some corners, each given by column and row from the image's centre and by its
+    /// inverse depth: a convex solid stays convex in these coordinates, where every face plane is linear, so the corners tell for
+    /// all of the hull. Planes that the camera is nearly in are not trusted.
+    pub(super) fn covers(&self, corners: &[[f32; 3]]) -> bool {
+        /// By how much the inverse depth must exceed what is to be hidden, 1 / m: far more than rounding.
+        const MARGIN: f32 = 1e-3;
+        /// Largest value of a plane's terms that is trusted, 1 / m.
+        const MOST: f32 = 1e3;
+        let value = |[a, b, c]: &[f32; 3], [u, v, _]: &[f32; 3]| {
+            let terms = [a * u, b * v, *c];
+            terms.iter().all(|term| term.abs() < MOST).then(|| terms.iter().sum::<f32>())
+        };
+        !self.outside.is_empty()
+            && corners.iter().all(|corner| {
+                let mut enter = f32::INFINITY;
+                for plane in &self.outside {
+                    match value(plane, corner) {
+                        Some(w) if w > corner[2] + MARGIN => enter = enter.min(w),
+                        _ => return false,
+                    }
+                }
+                self.inside.iter().all(|plane| value(plane, corner).is_some_and(|w| w + MARGIN < enter))
+            })
+    }
+
     fn new(
         vertices: &[Point],
         faces: &[HalfSpace],
@@ -214,7 +274,7 @@ impl ProjectedPart {
 }
 
 /// The pixels whose rays can hit the hull of `vertices`.
-fn image_rect(vertices: &[Point], camera_from_part: &Pose, intrinsics: &Intrinsics) -> Rect {
+pub(super) fn image_rect(vertices: &[Point], camera_from_part: &Pose, intrinsics: &Intrinsics) -> Rect {
     let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
     let center = intrinsics.principal_px();
     let (mut behind, mut before) = (false, false);

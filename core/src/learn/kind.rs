@@ -11,6 +11,8 @@ pub enum Kind {
     Maps,
     /// Scenes seen from views, and pushes.
     Pushes,
+    /// States of episodes, and what pushes from each are worth.
+    Worth,
 }
 
 impl fmt::Display for Kind {
@@ -18,6 +20,7 @@ impl fmt::Display for Kind {
         f.pad(match self {
             Self::Maps => "maps",
             Self::Pushes => "pushes",
+            Self::Worth => "worth",
         })
     }
 }

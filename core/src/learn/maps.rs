@@ -1,7 +1,7 @@
 //! Map samples: a settled random scene, what ten random views of it see, and the truth.
 
 use super::bytes::{Reader, put_set};
-use super::{Kind, Sample, VIEWS};
+use super::{Kind, Record, Sample, VIEWS};
 use crate::arm::ArmTool;
 use crate::camera::{MapObservation, NoiseModel, ViewArray, ViewId, project};
 use crate::grid::{Grid, VoxelSet};
@@ -56,7 +56,7 @@ impl Recipe {
     }
 
     /// The scene of a sample, before it settles. One that is too full for its objects' stretches keeps their usual sizes.
-    fn scene(&self, seed: u64) -> Result<Scene> {
+    pub(super) fn scene(&self, seed: u64) -> Result<Scene> {
         let scene = generate(&self.catalog, &self.scenes, seed)?;
         if stream(seed, "sample stretch", 0).random::<f32>() >= self.stretch.share {
             return Ok(scene);
@@ -146,8 +146,6 @@ pub(super) fn take_views(reader: &mut Reader<'_>, ids: &[u16]) -> Option<Vec<Vie
 }
 
 impl Sample for MapSample {
-    const KIND: Kind = Kind::Maps;
-
     fn simulate(recipe: &Recipe, seed: u64) -> Result<Self> {
         let world = recipe.world(seed)?;
         let (grid, bodies) = (recipe.grid(), world.bodies());
@@ -155,6 +153,10 @@ impl Sample for MapSample {
         let views = recipe.look(world.shelf(), &bodies, VIEWS, seed)?;
         Ok(Self { seed, truth: occupied(&grid, &truth), labels: truth.labels, views })
     }
+}
+
+impl Record for MapSample {
+    const KIND: Kind = Kind::Maps;
 
     fn to_bytes(&self) -> Vec<u8> {
         let mut out = self.seed.to_le_bytes().to_vec();

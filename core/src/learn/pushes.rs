@@ -13,7 +13,7 @@
 
 use super::bytes::{Reader, put_set};
 use super::maps::{occupied, put_views, take_views};
-use super::{Kind, Recipe, Sample, VIEWS, ViewSample};
+use super::{Kind, Recipe, Record, Sample, VIEWS, ViewSample};
 use crate::Result;
 use crate::arm::ArmTool;
 use crate::arm::Push;
@@ -138,8 +138,6 @@ fn put_padded(out: &mut Vec<u8>, views: &[ViewSample], count: usize, sample: &Pu
 }
 
 impl Sample for PushSample {
-    const KIND: Kind = Kind::Pushes;
-
     fn simulate(recipe: &Recipe, seed: u64) -> Result<Self> {
         let mut sample = Self::attempt(recipe, seed, seed)?;
         for attempt in 1..TRIES {
@@ -150,6 +148,10 @@ impl Sample for PushSample {
         }
         Ok(sample)
     }
+}
+
+impl Record for PushSample {
+    const KIND: Kind = Kind::Pushes;
 
     fn to_bytes(&self) -> Vec<u8> {
         let mut out = self.seed.to_le_bytes().to_vec();

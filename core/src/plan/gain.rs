@@ -40,7 +40,7 @@ pub(super) enum By {
 }
 
 /// What looking gains at one step.
-pub(super) struct Looking {
+pub(crate) struct Looking {
     /// Gain of every view of the array, nats.
     pub gains: Vec<f32>,
     /// The best pair of those offered; `None` where none gains anything.
@@ -105,7 +105,7 @@ impl Gain {
     }
 
     /// Gain of every view of the array, and the best pair of those offered.
-    pub(super) fn of_looking(&self, array: &ViewArray, offered: impl Fn(&ViewId) -> bool) -> Looking {
+    pub(crate) fn of_looking(&self, array: &ViewArray, offered: impl Fn(&ViewId) -> bool) -> Looking {
         let ids: Vec<ViewId> = array.views.iter().map(|view| view.id).collect();
         match &self.0 {
             By::Rays(field) => {

@@ -183,6 +183,7 @@ impl Table {
             jammed: false,
             dropped: Vec::new(),
             toppled: Vec::new(),
+            shown: Vec::new(),
         }
     }
 

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 pub const COARSE_VIEWS: usize = 60;
 
 /// The views that rank the candidates, of those that are offered.
-fn coarse(offered: &[ViewId]) -> Vec<ViewId> {
+pub(crate) fn coarse(offered: &[ViewId]) -> Vec<ViewId> {
     offered.iter().copied().step_by((offered.len() / COARSE_VIEWS).max(1)).collect()
 }
 

@@ -1,0 +1,206 @@
+//! An episode on the way from state to state.
+
+use super::considered::Considered;
+use super::{STATES_PER_EPISODE, WorthRecipe};
+use crate::Result;
+use crate::belief::{Belief, Sightings, SweptPush, look};
+use crate::camera::{NoiseModel, ViewId, project};
+use crate::gain::ViewPair;
+use crate::learn::Recipe;
+use crate::plan::{Counted, Gain};
+use crate::rng::stream;
+use crate::scene::{Family, GenerateConfig};
+use crate::world::World;
+use rand::Rng;
+use std::cell::OnceCell;
+
+/// Chance of a push before a state, the first one left out.
+const PUSH_CHANCE: f32 = 0.6;
+/// Looks before a state at most.
+const LOOKS: usize = 3;
+
+/// What happens before a state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Leg {
+    /// The push that comes first, if one does.
+    pub push: Option<Earlier>,
+    /// The looks that follow.
+    pub looks: usize,
+}
+
+/// Which push of the state before is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Earlier {
+    /// The one that promises most.
+    Best,
+    /// The one at this share of their list.
+    AtRandom(f32),
+}
+
+/// What happens in the episode of a seed.
+pub(super) fn legs(seed: u64) -> [Leg; STATES_PER_EPISODE] {
+    let mut rng = stream(seed, "worth legs", 0);
+    std::array::from_fn(|leg| {
+        let (pushes, best, which): (f32, bool, f32) = (rng.random(), rng.random(), rng.random());
+        let push = if best { Earlier::Best } else { Earlier::AtRandom(which) };
+        let looks = rng.random_range(1..=LOOKS);
+        Leg { push: (leg > 0 && pushes < PUSH_CHANCE).then_some(push), looks }
+    })
+}
+
+/// An episode as far as it has come. A clone is a branch.
+#[derive(Clone)]
+pub(super) struct Rollout<'a> {
+    pub recipe: &'a WorthRecipe,
+    pub seed: u64,
+    pub family: Family,
+    pub world: World,
+    pub belief: Belief,
+    pub sightings: Sightings,
+    /// Views that were looked from, in order.
+    pub looks: Vec<u16>,
+    pub pushes: u8,
+    pub noise: NoiseModel,
+    /// Whether an object was dropped.
+    dropped: bool,
+    /// Views used since the last push.
+    used: Vec<ViewId>,
+    /// Views that the hand cannot be at.
+    unreachable: Vec<ViewId>,
+    /// Chance that a look is a random one.
+    random_looks: f32,
+    actions: u64,
+    /// [`Self::best_views`], once it is known.
+    best: OnceCell<(Option<ViewPair>, f32)>,
+}
+
+impl<'a> Rollout<'a> {
+    /// The episode of a seed, before anything is seen.
+    pub fn new(recipe: &'a WorthRecipe, seed: u64) -> Result<Self> {
+        let base = &recipe.base;
+        let mut rng = stream(seed, "worth episode", 0);
+        let family = recipe.families[rng.random_range(0..recipe.families.len())];
+        let noisy = rng.random::<f32>() < base.noise_share;
+        let random_looks = [0.0, 0.0, 0.5, 1.0][rng.random_range(0..4_usize)];
+        let scenes = GenerateConfig { fill: family.fill(), rho: family.rho(), family, ..base.scenes.clone() };
+        let world = Recipe { scenes, ..base.clone() }.world(seed)?;
+        let grid = base.grid();
+        let hands = base.views.hand_poses(&base.arm);
+        Ok(Self {
+            recipe,
+            seed,
+            family,
+            world,
+            belief: Belief::uniform(grid),
+            sightings: Sightings::none(&grid),
+            looks: Vec::new(),
+            pushes: 0,
+            noise: if noisy { NoiseModel::STANDARD } else { NoiseModel::OFF },
+            dropped: false,
+            used: Vec::new(),
+            unreachable: base.views.unreachable(&hands),
+            random_looks,
+            actions: 0,
+            best: OnceCell::new(),
+        })
+    }
+
+    /// The views that the hand can be at.
+    pub fn offered(&self) -> Vec<ViewId> {
+        let all = self.recipe.base.views.views.iter().map(|view| view.id);
+        all.filter(|view| !self.unreachable.contains(view)).collect()
+    }
+
+    /// The best two views, as the planner would choose them, and what they promise together, nats.
+    pub fn best_views(&self) -> (Option<ViewPair>, f32) {
+        *self.best.get_or_init(|| self.find_best_views())
+    }
+
+    fn find_best_views(&self) -> (Option<ViewPair>, f32) {
+        let offered = |view: &ViewId| !self.used.contains(view) && !self.unreachable.contains(view);
+        let gain = Gain::new(Counted::Unseen, &self.belief, self.sightings.seen());
+        let looking = gain.of_looking(&self.recipe.base.views, offered);
+        (looking.pair, looking.igv)
+    }
+
+    /// Looks once, in the way of this episode.
+    pub fn look(&mut self) {
+        let mut rng = stream(self.seed, "worth looks", self.actions);
+        if rng.random::<f32>() < self.random_looks {
+            let offered = self.offered();
+            let unused: Vec<ViewId> = offered.iter().copied().filter(|view| !self.used.contains(view)).collect();
+            let from = if unused.is_empty() { offered } else { unused };
+            if !from.is_empty() {
+                self.look_from(from[rng.random_range(0..from.len())]);
+            }
+        } else {
+            self.look_best();
+        }
+    }
+
+    /// Looks from the view that tells most.
+    pub fn look_best(&mut self) {
+        let first_unused = || self.offered().into_iter().find(|view| !self.used.contains(view));
+        let chosen = self.best_views().0.map(|pair| pair.first).or_else(first_unused);
+        self.look_from(chosen.unwrap_or(ViewId(0)));
+    }
+
+    fn look_from(&mut self, view: ViewId) {
+        let (views, update) = (&self.recipe.base.views, &self.recipe.update);
+        let Some(view) = views.view(view) else { return };
+        let shelf = *self.world.shelf();
+        self.actions += 1;
+        let image = self.noise.take(&shelf, &self.world.bodies(), view, &views.intrinsics, self.seed, self.actions);
+        let observation = project(&image, view, &views.intrinsics, &shelf);
+        self.belief = look(&**update, &self.belief, &observation, &mut self.sightings);
+        self.used.push(view.id);
+        self.looks.push(view.id.0);
+        self.best = OnceCell::new();
+    }
+
+    /// Makes one of the pushes that are considered, if one is and nothing was dropped before.
+    pub fn push(&mut self, considered: &Considered, which: Earlier) {
+        let count = considered.pushes.len();
+        let chosen = match which {
+            Earlier::Best => considered.best(),
+            Earlier::AtRandom(share) => (count > 0).then(|| ((share * count as f32) as usize).min(count - 1)),
+        };
+        if let (Some(at), false) = (chosen, self.dropped) {
+            self.make(considered, at);
+        }
+    }
+
+    /// Makes the push at a position of those that are considered.
+    pub fn make(&mut self, considered: &Considered, at: usize) {
+        let Some(motion) = &considered.pushes[at].motion else { return };
+        let arm = &self.recipe.base.arm.arm;
+        let outcome = self.world.execute(arm, motion);
+        self.actions += 1;
+        self.pushes += 1;
+        self.used.clear();
+        self.best = OnceCell::new();
+        self.dropped |= !outcome.dropped.is_empty();
+        let swept = SweptPush::done(&considered.pushes[at].swept.push, &outcome, arm, &self.belief.grid);
+        let predicted = self.recipe.update.predict_pushes(&self.belief, std::slice::from_ref(&swept));
+        for prediction in predicted {
+            self.belief.apply(&prediction);
+            self.sightings.forget_changed(&prediction);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_have_one_to_twelve_looks_and_up_to_three_pushes_behind_them() {
+        let mut pushes = [0; 4];
+        for seed in 0..200 {
+            let legs = legs(seed);
+            assert!(legs.iter().all(|leg| (1..=LOOKS).contains(&leg.looks)) && legs[0].push.is_none());
+            pushes[legs.iter().filter(|leg| leg.push.is_some()).count()] += 1;
+        }
+        assert!(pushes.iter().all(|count| *count >= 5), "{pushes:?}");
+    }
+}

@@ -101,7 +101,7 @@ fn run(
         (0..leg.looks).for_each(|_| rollout.look());
         let is_wanted = wanted.contains(&at);
         let is_pushed = at < last && legs[at + 1].push.is_some();
-        considered = (is_wanted || is_pushed).then(|| Considered::of(&rollout));
+        considered = (is_wanted || is_pushed).then(|| rollout.considered());
         if let (true, Some(considered)) = (is_wanted, &considered) {
             each(at, &measure(&rollout, at as u8, considered, pushed).to_bytes())?;
         }

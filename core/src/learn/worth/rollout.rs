@@ -5,15 +5,18 @@ use super::{STATES_PER_EPISODE, WorthRecipe};
 use crate::Result;
 use crate::belief::{Belief, Sightings, SweptPush, look};
 use crate::camera::{NoiseModel, ViewId, project};
-use crate::gain::ViewPair;
+use crate::gain::{Openings, RayDensity, ViewPair};
 use crate::learn::Recipe;
-use crate::plan::{Counted, Gain};
+use crate::plan::{Counted, Gain, coarse, disturbance};
+use crate::push::{Candidate, PushSampler, sample};
 use crate::rng::stream;
 use crate::scene::{Family, GenerateConfig};
 use crate::world::World;
 use rand::Rng;
 use std::cell::OnceCell;
 
+/// One of so many pushes is drawn before what is hidden, the others from the frontier.
+const ONE_HIDDEN_IN: usize = 4;
 /// Chance of a push before a state, the first one left out.
 const PUSH_CHANCE: f32 = 0.6;
 /// Looks before a state at most.
@@ -121,6 +124,32 @@ impl<'a> Rollout<'a> {
         let gain = Gain::new(Counted::Unseen, &self.belief, self.sightings.seen());
         let looking = gain.of_looking(&self.recipe.base.views, offered);
         (looking.pair, looking.igv)
+    }
+
+    /// Draws pushes from here and weighs them.
+    pub fn considered(&self) -> Considered {
+        let (belief, seen) = (&self.belief, self.sightings.seen());
+        let (base, wanted) = (&self.recipe.base, self.recipe.pushes);
+        let of_hidden = wanted / ONE_HIDDEN_IN;
+        let (mut pushes, mut samplers) = (Vec::new(), Vec::new());
+        let draws = [(PushSampler::Frontier, wanted - of_hidden), (PushSampler::Hidden, of_hidden)];
+        for (which, (sampler, count)) in draws.into_iter().enumerate() {
+            let mut rng = stream(self.seed, "worth pushes", (2 * self.looks.len() + which) as u64);
+            let drawn = sample(sampler, belief, Some(seen), &base.arm, count, &mut rng);
+            let feasible = drawn.into_iter().filter(|candidate| candidate.rejection.is_none());
+            pushes.extend(feasible);
+            samplers.resize(pushes.len(), sampler);
+        }
+        let swept: Vec<_> = pushes.iter().map(|candidate: &Candidate| candidate.swept.clone()).collect();
+        let predictions = self.recipe.update.predict_pushes(belief, &swept);
+        let gain = Gain::new(Counted::Unseen, belief, seen);
+        let openings = Openings::new(gain.field(), &base.views, &coarse(&self.offered()), RayDensity::COARSE);
+        let gains = openings.under_each(&predictions);
+        let regs = predictions.iter().map(|prediction| disturbance(belief, prediction)).collect();
+        let arm = &base.arm.arm;
+        let duration = |push: &Candidate| push.motion.as_ref().map_or(0.0, |motion| motion.duration_s(arm) as f32);
+        let motions_s = pushes.iter().map(duration).collect();
+        Considered { pushes, samplers, predictions, gains, regs, motions_s }
     }
 
     /// Looks once, in the way of this episode.

@@ -27,7 +27,7 @@ fn main() {
 
     let observations: Vec<_> = (views.views.iter().step_by(37))
         .map(|view| {
-            project(&render(&scene.shelf, &bodies, view, &views.intrinsics), view, &views.intrinsics, &scene.shelf)
+            project(&render(&scene.shelf, &bodies, view, &views.intrinsics).frame, &scene.shelf)
         })
         .collect();
     let belief = observations.iter().fold(Belief::uniform(scene.grid()), |belief, seen| update.observe(&belief, seen));

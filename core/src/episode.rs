@@ -19,9 +19,9 @@ mod npz;
 mod record;
 mod replay;
 mod resume;
-mod told_file;
 #[cfg(test)]
 mod synthetic;
+mod told_file;
 
 pub use directory::{DirectoryState, EpisodeDir, Overwrite};
 pub use infer::infer;

@@ -16,7 +16,7 @@ pub use summary::{Measure, MeasureSummary, StepSummary};
 
 use crate::arm::{Push, PushMotion};
 use crate::belief::BeliefUpdate;
-use crate::episode::{Difference, Episode, EpisodeDir, EpisodeRecord, StepRecord, StoredTruth, revisit};
+use crate::episode::{Difference, Episode, EpisodeDir, EpisodeRecord, NO_TRUTH, StepRecord, StoredTruth, revisit};
 use crate::plan::{Action, CandidateRecord, Reason};
 use crate::push::{ArmClearance, PushTruth};
 use crate::rng::stream;

@@ -71,7 +71,9 @@ impl Frame {
             return fail("world_from_camera", "its position must be finite and within 100 m".to_owned());
         }
         let [width, height] = self.size();
-        let (pixels, at) = (width * height, |index: usize| format!("row {}, column {}", index % (width * height) / width, index % width));
+        let (pixels, at) = (width * height, |index: usize| {
+            format!("row {}, column {}", index % (width * height) / width, index % width)
+        });
         let same_size = |field: &str, count: usize, classes: usize| {
             if count == pixels * classes {
                 return Ok(());

@@ -118,8 +118,7 @@ impl NoiseModel {
         let really = view.world_from_camera * error;
         let Sensed { frame, objects } = shoot(&view.moved_to(really))?;
         let was_placed = *frame.world_from_camera() == really;
-        let thought =
-            if was_placed { view.world_from_camera } else { frame.world_from_camera() * error.inverse() };
+        let thought = if was_placed { view.world_from_camera } else { frame.world_from_camera() * error.inverse() };
         Ok(Sensed { frame: frame.moved_to(thought), objects })
     }
 
@@ -277,7 +276,8 @@ mod tests {
         assert!((0.0003..0.02).contains(&error.translation.vector.norm()), "{error}");
         // A recorded frame of a camera that was elsewhere.
         let recorded = flat(0.6).frame.moved_to(Pose::translation(0.0, -0.5, 0.1));
-        let thought = noise.aim(&view, 3, 1, |_| Ok(Sensed { frame: recorded.clone(), objects: None })).expect("a frame");
+        let thought =
+            noise.aim(&view, 3, 1, |_| Ok(Sensed { frame: recorded.clone(), objects: None })).expect("a frame");
         let off = thought.frame.world_from_camera() * error;
         assert!((off.translation.vector - recorded.world_from_camera().translation.vector).norm() < 1e-6);
         let exact = NoiseModel::OFF.aim(&view, 3, 1, |_| Ok(Sensed { frame: recorded.clone(), objects: None }));

@@ -45,8 +45,7 @@ impl From<Intrinsics> for Pinhole {
 impl Pinhole {
     /// The ray through the centre of a pixel, in the camera's frame and one metre deep: `depth * ray` is the point seen.
     pub fn ray(&self, column: usize, row: usize) -> Vector {
-        let across =
-            |pixel: usize, axis: usize| (pixel as f32 + 0.5 - self.principal_px[axis]) / self.focal_px[axis];
+        let across = |pixel: usize, axis: usize| (pixel as f32 + 0.5 - self.principal_px[axis]) / self.focal_px[axis];
         let (x, y) = (across(column, 0), across(row, 1));
         if self.distortion == [0.0; 5] {
             return Vector::new(x, y, 1.0);
@@ -109,7 +108,8 @@ impl Pinhole {
         let corners = [(0, 0), (self.width - 1, 0), (0, self.height - 1), (self.width - 1, self.height - 1)];
         for (column, row) in corners {
             let back = self.pixel(self.ray(column, row));
-            let is_near = |at: [f32; 2]| (at[0] - column as f32 - 0.5).abs() < 0.5 && (at[1] - row as f32 - 0.5).abs() < 0.5;
+            let is_near =
+                |at: [f32; 2]| (at[0] - column as f32 - 0.5).abs() < 0.5 && (at[1] - row as f32 - 0.5).abs() < 0.5;
             if !back.is_some_and(is_near) {
                 return Err(("distortion", format!("{:?} cannot be undone at the image's corners", self.distortion)));
             }

@@ -66,7 +66,7 @@ impl Simulated {
     pub fn world(&self) -> &World {
         self.world.get_or_init(|| {
             let mut world = (*self.start).clone();
-            for resumed in &self.resumed {
+            if let Some(resumed) = &self.resumed {
                 resumed.pushed.iter().for_each(|motion| drop(world.execute(&resumed.arm.arm, motion)));
             }
             world

@@ -317,7 +317,9 @@ impl EpisodeDir {
             return Err(Error::input(&self.path, "", message));
         }
         let missing = record.steps.iter().map(|step| self.told_path(step)).find(|path| !path.is_file());
-        missing.map_or(Ok(()), |path| Err(Error::input(path, "", "is missing: what is to be inferred from was filed there")))
+        missing.map_or(Ok(()), |path| {
+            Err(Error::input(path, "", "is missing: what is to be inferred from was filed there"))
+        })
     }
 
     /// Reads what the belief update of a step was told.
@@ -416,9 +418,8 @@ fn numbered_files(path: &Path) -> Result<Vec<Numbered>> {
     for folder in FOLDERS {
         let directory = path.join(folder);
         if directory.is_dir() {
-            let numbered = |name: &String| {
-                Some(Numbered { path: directory.join(name), folder, index: index_of(folder, name)? })
-            };
+            let numbered =
+                |name: &String| Some(Numbered { path: directory.join(name), folder, index: index_of(folder, name)? });
             found.extend(names_in(&directory)?.iter().filter_map(numbered));
         }
     }

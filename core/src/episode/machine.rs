@@ -12,7 +12,7 @@ use crate::camera::{Frame, MapObservation, NoiseModel, Sensed, View, ViewArray, 
 use crate::environment::{Environment, Simulated};
 use crate::grid::{Grid, VoxelSet};
 use crate::made_by::{Build, MadeBy};
-use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
+use crate::plan::{self, Action, Counted, Decision, History, Situation};
 use crate::push::{ArmClearance, Candidate, Counterfactual};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
@@ -47,7 +47,7 @@ pub struct Episode {
 }
 
 /// What a belief update was told: all that it takes to have the belief again.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum Told {
     /// After a look what the environment gave, with the pose where the camera was thought to be; noise is not in its pixels.
     Frame(Sensed),
@@ -525,11 +525,7 @@ fn check(scene: &Scene, config: &EpisodeConfig, update: &dyn BeliefUpdate) -> Re
 }
 
 /// A frame with the noise of the next step, the same for whoever asks: the oracle sees the very frame that a look would give.
-fn sense(
-    record: &EpisodeRecord,
-    view: &View,
-    shoot: impl FnOnce(&View) -> Result<Sensed>,
-) -> Result<(Sensed, Frame)> {
+fn sense(record: &EpisodeRecord, view: &View, shoot: impl FnOnce(&View) -> Result<Sensed>) -> Result<(Sensed, Frame)> {
     let noise = record.config.noise.unwrap_or(NoiseModel::OFF);
     let (seed, step) = (record.config.seed, record.steps.len() as u64 + 1);
     let sensed = noise.aim(view, seed, step, shoot)?;
@@ -569,3 +565,7 @@ impl Clone for Stopwatch {
 #[cfg(test)]
 #[path = "machine_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "environment_tests.rs"]
+mod environment_tests;

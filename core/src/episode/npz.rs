@@ -218,7 +218,8 @@ impl<'a> OpenArchive<'a> {
     }
 
     fn has(&self, name: &str) -> bool {
-        self.zip.index_for_name(&npyz::npz::file_name_from_array_name(name)).is_some()
+        let file = npyz::npz::file_name_from_array_name(name);
+        self.zip.file_names().any(|name| *name == file)
     }
 
     fn words(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u16>> {

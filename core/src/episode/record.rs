@@ -130,8 +130,9 @@ impl TryFrom<RawStep> for StepRecord {
     type Error = String;
 
     fn try_from(raw: RawStep) -> Result<Self, String> {
-        let RawStep { index, action, decision, scores, objects, dropped, displacement_m, motion_s, push, seconds, .. } =
-            raw;
+        let RawStep {
+            index, action, decision, scores, objects, dropped, displacement_m, motion_s, push, seconds, ..
+        } = raw;
         let judgement = RawJudgement { scores, objects, dropped, displacement_m }.checked()?;
         let scored = judgement.as_ref().map(|judgement| judgement.scores.entropy_nats);
         let entropy_nats = raw.entropy_nats.or(scored).ok_or("missing field `entropy_nats`")?;

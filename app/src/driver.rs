@@ -41,7 +41,7 @@ struct Story {
     /// The bodies before the first action.
     start: Vec<Body>,
     /// Belief and truth after the first action and after half of the budget.
-    moments: Vec<(usize, Belief, TruthMap)>,
+    moments: Vec<(usize, Belief, Option<TruthMap>)>,
 }
 
 impl Story {
@@ -53,7 +53,7 @@ impl Story {
     fn note(&mut self, episode: &Episode) {
         let (step, half) = (episode.record().steps.len(), episode.record().config.budget.div_ceil(2));
         if step == 1 || step == half {
-            self.moments.push((step, episode.belief().clone(), episode.truth().clone()));
+            self.moments.push((step, episode.belief().clone(), episode.truth().cloned()));
         }
     }
 
@@ -64,7 +64,7 @@ impl Story {
             .moments
             .iter()
             .filter(|(step, ..)| *step != last)
-            .map(|(step, belief, truth)| Moment { step: *step, belief, truth })
+            .map(|(step, belief, truth)| Moment { step: *step, belief, truth: truth.as_ref() })
             .collect();
         moments.push(Moment { step: last, belief: episode.belief(), truth: episode.truth() });
         summary(&Summary {

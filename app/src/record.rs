@@ -29,8 +29,8 @@ use crate::verdicts::Judged;
 use disk::{Disk, Fault};
 use nudge_core::arm::{ArmTool, Joints};
 use nudge_core::belief::{Belief, PushPrediction};
-use nudge_core::camera::{Image, View, ViewArray, ViewId};
-use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
+use nudge_core::camera::{Frame, ViewArray, ViewId};
+use nudge_core::episode::{Episode, EpisodeRecord, NO_TRUTH, StepOutcome, StepRecord};
 use nudge_core::gain::GainField;
 use nudge_core::grid::{Grid, VoxelSet};
 use nudge_core::plan::{Action, PlannerSettings, gain_field};
@@ -75,10 +75,12 @@ pub struct State<'a> {
     pub belief: &'a Belief,
     /// Voxels that do not count as a gain any more, if some do not.
     pub seen: Option<&'a VoxelSet>,
-    /// What is.
-    pub truth: &'a TruthMap,
-    /// How they compare.
-    pub scores: &'a Scores,
+    /// What is, if that is known.
+    pub truth: Option<&'a TruthMap>,
+    /// How they compare, if that is known.
+    pub scores: Option<&'a Scores>,
+    /// Entropy of what is believed, nats.
+    pub entropy_nats: f64,
 }
 
 /// Writes an episode into a recording.
@@ -150,15 +152,15 @@ impl Recorder {
     pub fn step(&mut self, episode: &Episode, outcome: &StepOutcome) -> Result<()> {
         let bodies = episode.bodies();
         self.record(&setting(episode), &state(episode, &bodies), Some(outcome))?;
-        self.remark(None, &Judged::by_scorer(&outcome.record.objects))
+        self.remark(None, &Judged::by_scorer(outcome.record.objects()))
     }
 
     /// Records a state with what led to it: without an outcome the prior. States come in the order of their steps.
     pub fn record(&mut self, setting: &Setting<'_>, state: &State<'_>, outcome: Option<&StepOutcome>) -> Result<()> {
         let gain = outcome.zip(self.field.as_ref()).and_then(|(outcome, field)| gain::of(setting, field, outcome));
-        let surprise = outcome.and_then(|outcome| outcome.prediction.as_ref()).zip(self.truth.as_ref());
-        let surprise = surprise
-            .map(|(predicted, before)| predicted.surprise(&state.belief.grid, &before.changed_cells(state.truth)));
+        let predicted = outcome.and_then(|outcome| outcome.prediction.as_ref());
+        let changed = self.truth.as_ref().zip(state.truth).map(|(before, after)| before.changed_cells(after));
+        let surprise = predicted.zip(changed).map(|(predicted, changed)| predicted.surprise(&state.belief.grid, &changed));
         self.robot(setting, state.step, outcome)?;
         self.state(setting, state)?;
         let surprise = surprise.map(|surprise| floor::picture(&picture::paint_surprise(&state.belief.grid, &surprise)));
@@ -166,8 +168,11 @@ impl Recorder {
         match outcome {
             Some(outcome) => self.outcome(setting, state.belief, outcome, gain.as_ref())?,
             None => {
-                let line = format!("prior: {}", decision::scores_line(state.scores));
+                let line = format!("prior: {}", decision::scores_line(state.scores, state.entropy_nats));
                 self.note(line, rerun::TextLogLevel::INFO)?;
+                if state.truth.is_none() {
+                    self.note(NO_TRUTH.to_owned(), rerun::TextLogLevel::INFO)?;
+                }
             }
         }
         self.field = Some(gain_field(state.belief, state.seen));
@@ -272,7 +277,7 @@ impl Recorder {
     /// Records bodies, belief, truth, error and scores.
     fn state(&mut self, setting: &Setting<'_>, state: &State<'_>) -> Result<()> {
         self.stream.set_time_sequence(paths::TIMELINE, state.step as i64);
-        if self.truth.is_none() {
+        if state.step == 0 {
             self.log(paths::CAMERA_VIEWS, &shapes::frusta_without_gain(setting.views))?;
         }
         self.bodies(setting, state.bodies)?;
@@ -283,16 +288,20 @@ impl Recorder {
         self.log(paths::BELIEF_SEMANTICS, &floor::classes(belief))?;
         self.log(paths::BELIEF_CERTAINTY, &floor::certainty(belief))?;
         self.log(paths::BELIEF_ENTROPY, &floor::picture(&picture::paint_entropy(belief)))?;
-        if self.truth.as_ref() != Some(state.truth) {
-            self.log(paths::TRUTH_OCCUPANCY, &voxels::true_classes(grid, state.truth, setting.catalog))?;
-            self.log(paths::TRUTH_LABELS, &floor::labels(grid, &state.truth.labels))?;
-            self.log(paths::TRUTH_OUTLINES, &floor::outlines(state.truth))?;
-            self.truth = Some(state.truth.clone());
+        if let Some(truth) = state.truth {
+            if self.truth.as_ref() != Some(truth) {
+                self.log(paths::TRUTH_OCCUPANCY, &voxels::true_classes(grid, truth, setting.catalog))?;
+                self.log(paths::TRUTH_LABELS, &floor::labels(grid, &truth.labels))?;
+                self.log(paths::TRUTH_OUTLINES, &floor::outlines(truth))?;
+                self.truth = Some(truth.clone());
+            }
+            self.log(paths::ERROR_OCCUPANCY, &voxels::errors(belief, truth))?;
+            self.log(paths::ERROR_SEMANTICS, &floor::picture(&picture::paint_errors(belief, truth)))?;
         }
-        self.log(paths::ERROR_OCCUPANCY, &voxels::errors(belief, state.truth))?;
-        self.log(paths::ERROR_SEMANTICS, &floor::picture(&picture::paint_errors(belief, state.truth)))?;
         for series in decision::SERIES {
-            self.log(&paths::score(series.key), &rerun::Scalars::single((series.value)(state.scores)))?;
+            if let Some(value) = series.at(state.scores, state.entropy_nats) {
+                self.log(&paths::score(series.key), &rerun::Scalars::single(value))?;
+            }
         }
         Ok(())
     }
@@ -331,9 +340,9 @@ impl Recorder {
         self.log_or_clear(paths::GAIN_LABEL, gain.map(|gain| gain.label(setting.shelf)))?;
         let any = !decision.candidates.is_empty();
         self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision, setting.planner.gamma)))?;
-        match (record.action, &outcome.image) {
-            (Action::Look { view }, Some(image)) => self.look(setting, view, image)?,
-            _ => {
+        match &outcome.frame {
+            Some(frame) => self.look(frame)?,
+            None => {
                 for path in [paths::CAMERA_CURRENT, paths::OBSERVATION_DEPTH, paths::OBSERVATION_LABELS] {
                     self.log(path, &rerun::Clear::flat())?;
                 }
@@ -354,12 +363,11 @@ impl Recorder {
         self.warn(record)
     }
 
-    fn look(&self, setting: &Setting<'_>, view: nudge_core::camera::ViewId, image: &Image) -> Result<()> {
-        let Some(View { world_from_camera, .. }) = setting.views.views.get(usize::from(view.0)) else { return Ok(()) };
-        self.log(paths::CAMERA_CURRENT, &shapes::transform(world_from_camera))?;
-        self.log(paths::CAMERA_CURRENT, &shapes::pinhole(&setting.views.intrinsics))?;
-        self.log(paths::OBSERVATION_DEPTH, &shapes::depth_image(image, &setting.views.intrinsics))?;
-        self.log(paths::OBSERVATION_LABELS, &shapes::label_image(image))
+    fn look(&self, frame: &Frame) -> Result<()> {
+        self.log(paths::CAMERA_CURRENT, &shapes::transform(frame.world_from_camera()))?;
+        self.log(paths::CAMERA_CURRENT, &shapes::pinhole(frame.intrinsics()))?;
+        self.log(paths::OBSERVATION_DEPTH, &shapes::depth_image(frame))?;
+        self.log(paths::OBSERVATION_LABELS, &shapes::label_image(frame))
     }
 
     fn predicted(&self, grid: &Grid, prediction: Option<&PushPrediction>) -> Result<()> {
@@ -453,7 +461,8 @@ fn state<'a>(episode: &'a Episode, bodies: &'a [Body]) -> State<'a> {
         belief: episode.belief(),
         seen: episode.seen(),
         truth: episode.truth(),
-        scores: record.steps.last().map_or(&record.prior, |step| &step.scores),
+        scores: record.scores_after(record.steps.len()),
+        entropy_nats: record.entropy_after(record.steps.len()),
     }
 }
 

@@ -10,6 +10,7 @@
 
 pub(crate) mod blueprint;
 pub(crate) mod decision;
+mod continued;
 mod disk;
 mod floor;
 mod gain;
@@ -108,7 +109,24 @@ impl Recorder {
         Self::begin(path, &title(episode.record()), &setting(episode))
     }
 
-    /// The same for an episode of which only the states are at hand: [`Recorder::record`] writes them one by one.
+    /// Goes on with the recording `old` of a run that was stopped, in the file `path` (overwritten): what it holds is copied.
+    /// `None` for a recording that does not hold every step of the episode.
+    pub fn go_on(path: &Path, old: &Path, episode: &Episode) -> Result<Option<Self>> {
+        let fault = Fault::default();
+        let disk = Disk::create(path, fault.clone()).map_err(|error| Error::io(path, error))?;
+        let steps = episode.record().steps.len();
+        let Some(store) = continued::copy(old, &disk, steps) else { return Ok(None) };
+        let stream = stream_into(disk, path, RecordingStreamBuilder::from_store_id(&store))?;
+        let mut recorder = Self::bare(stream, "", path, fault);
+        recorder.field = Some(gain_field(episode.belief(), episode.seen()));
+        recorder.shown = episode.bodies().iter().map(|body| body.id).collect();
+        recorder.truth = episode.truth().cloned();
+        recorder.robot_s = episode.record().steps.iter().map(|step| step.motion_s).sum();
+        recorder.flush()?;
+        Ok(Some(recorder))
+    }
+
+    /// Starts one for an episode of which only the states are at hand: [`Recorder::record`] writes them one by one.
     pub fn begin(path: &Path, name: &str, setting: &Setting<'_>) -> Result<Self> {
         let (stream, fault) = file_stream(path, name)?;
         let recorder = Self::bare(stream, "", path, fault);
@@ -430,14 +448,18 @@ pub fn title(record: &EpisodeRecord) -> String {
 
 /// A stream into a file of its own, and what will be wrong with that.
 fn file_stream(path: &Path, name: &str) -> Result<(RecordingStream, Fault)> {
-    let failed = |error: &dyn std::fmt::Display| Error::io(path, std::io::Error::other(error.to_string()));
     let fault = Fault::default();
     let disk = Disk::create(path, fault.clone()).map_err(|error| Error::io(path, error))?;
-    let (_, store, properties, batches, hooks, _) =
-        RecordingStreamBuilder::new(APPLICATION).send_properties(false).into_args();
-    let stream = RecordingStream::new(store, properties, batches, hooks, Box::new(disk)).map_err(|e| failed(&e))?;
-    stream.send_recording_name(name).map_err(|e| failed(&e))?;
+    let stream = stream_into(disk, path, RecordingStreamBuilder::new(APPLICATION))?;
+    stream.send_recording_name(name).map_err(|error| Error::io(path, std::io::Error::other(error.to_string())))?;
     Ok((stream, fault))
+}
+
+/// A stream into a file that has been begun.
+fn stream_into(disk: Disk, path: &Path, builder: RecordingStreamBuilder) -> Result<RecordingStream> {
+    let (_, store, properties, batches, hooks, _) = builder.send_properties(false).into_args();
+    let stream = RecordingStream::new(store, properties, batches, hooks, Box::new(disk));
+    stream.map_err(|error| Error::io(path, std::io::Error::other(error.to_string())))
 }
 
 fn setting(episode: &Episode) -> Setting<'_> {

@@ -23,7 +23,7 @@ mod resume;
 mod synthetic;
 mod told_file;
 
-pub use directory::{DirectoryState, EpisodeDir, Overwrite};
+pub use directory::{DirectoryState, EpisodeDir, Frames, Overwrite};
 pub use infer::infer;
 pub use judgement::{Judgement, NO_TRUTH, Prior};
 pub use machine::{Episode, Told};

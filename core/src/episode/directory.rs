@@ -52,6 +52,16 @@ pub enum Overwrite {
     Replace,
 }
 
+/// Whether what belief updates are told (frames, and what the arm swept) is filed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Frames {
+    /// It is; [`infer`](super::infer()) needs it.
+    #[default]
+    Filed,
+    /// It is not.
+    Left,
+}
+
 /// What a path holds, seen by someone who wants to write an episode there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DirectoryState {
@@ -73,7 +83,7 @@ pub struct EpisodeDir {
     path: PathBuf,
     precision: Precision,
     /// Whether what belief updates are told is filed.
-    frames: bool,
+    frames: Frames,
     grid: OnceLock<Grid>,
     /// Held while this process writes here.
     lock: Option<File>,
@@ -168,9 +178,9 @@ impl EpisodeDir {
         self
     }
 
-    /// Does not file what belief updates are told ([`infer`](super::infer()) needs it); the default is to file it.
-    pub fn without_frames(mut self) -> Self {
-        self.frames = false;
+    /// Files what belief updates are told, or leaves it; the default is to file it.
+    pub fn with_frames(mut self, frames: Frames) -> Self {
+        self.frames = frames;
         self
     }
 
@@ -203,13 +213,13 @@ impl EpisodeDir {
         for file in numbered_files(path)?.into_iter().filter(|file| file.index > steps) {
             remove_if_there(&file.path)?;
         }
-        directory.frames = path.join(FRAMES).is_dir();
+        directory.frames = if path.join(FRAMES).is_dir() { Frames::Filed } else { Frames::Left };
         directory.precision = directory.read_belief_as_kept(0)?.1;
         Ok(directory)
     }
 
     fn at(path: &Path, lock: Option<File>) -> Self {
-        Self { path: path.to_owned(), precision: Precision::default(), frames: true, grid: OnceLock::new(), lock }
+        Self { path: path.to_owned(), precision: Precision::default(), frames: Frames::default(), grid: OnceLock::new(), lock }
     }
 
     /// The directory's path.
@@ -225,7 +235,7 @@ impl EpisodeDir {
     pub fn write(&mut self, episode: &mut Episode) -> Result<()> {
         let started = Instant::now();
         let index = episode.record().steps.len();
-        if self.frames {
+        if self.frames == Frames::Filed {
             self.make_folder(FRAMES)?;
             if let Some(told) = episode.told().filter(|_| index > 0) {
                 write_atomically(&self.numbered(FRAMES, index, told.extension()), &told.to_bytes())?;

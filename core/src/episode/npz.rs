@@ -67,7 +67,7 @@ impl From<&TruthMap> for StoredTruth {
 
 impl StoredTruth {
     /// The whole map; what is asked for the objects if the file does not tell, and if nobody does there are none.
-    pub(super) fn into_map(self, objects: impl FnOnce() -> Option<Vec<u16>>) -> TruthMap {
+    pub fn into_map(self, objects: impl FnOnce() -> Option<Vec<u16>>) -> TruthMap {
         let nobody = || vec![u16::MAX; self.labels.len()];
         let objects = self.objects.or_else(objects).unwrap_or_else(nobody);
         TruthMap { dims: self.dims, occupancy: self.occupancy, labels: self.labels, objects }

@@ -149,9 +149,9 @@ mod tests {
         // Changed and expected to; not changed but rather expected to; half; unknown; outside: one that changed, and others.
         let expected = [0.1_f32, 0.92, 0.69, 0.69, 0.0, 4.6, 0.0, 0.0];
         assert!(surprise.iter().zip(expected).all(|(nats, expected)| (nats - expected).abs() < 0.01), "{surprise:?}");
-        let review = Review { of: (SessionId(0), 1), predicted: Some(2), changed: 2, both: 1, surprise_nats: None };
+        let review = Review { of: (SessionId(0), 1), predicted: Some(2), changed: Some(2), both: Some(1), surprise_nats: None };
         assert_eq!((review.precision(), review.recall()), (Some(0.5), Some(0.5)));
-        let blind = Review { predicted: None, both: 0, ..review };
+        let blind = Review { predicted: None, both: Some(0), ..review };
         assert_eq!((blind.precision(), blind.recall()), (None, None));
     }
 }

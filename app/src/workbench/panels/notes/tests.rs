@@ -71,7 +71,7 @@ fn an_overruled_verdict_is_marked_and_counted() {
         .and_then(|moment| moment.outcome.clone())
         .expect("a step")
         .record
-        .objects
+        .objects()
         .clone();
     let wrong = objects.iter().find(|object| object.verdict != Verdict::Found).expect("one that was not found");
     let found = objects.iter().filter(|object| object.verdict == Verdict::Found).count();

@@ -9,8 +9,8 @@
 //! Entity names are in [`paths`] and nowhere else.
 
 pub(crate) mod blueprint;
-pub(crate) mod decision;
 mod continued;
+pub(crate) mod decision;
 mod disk;
 mod floor;
 mod gain;
@@ -178,7 +178,8 @@ impl Recorder {
         let gain = outcome.zip(self.field.as_ref()).and_then(|(outcome, field)| gain::of(setting, field, outcome));
         let predicted = outcome.and_then(|outcome| outcome.prediction.as_ref());
         let changed = self.truth.as_ref().zip(state.truth).map(|(before, after)| before.changed_cells(after));
-        let surprise = predicted.zip(changed).map(|(predicted, changed)| predicted.surprise(&state.belief.grid, &changed));
+        let surprise =
+            predicted.zip(changed).map(|(predicted, changed)| predicted.surprise(&state.belief.grid, &changed));
         self.robot(setting, state.step, outcome)?;
         self.state(setting, state)?;
         let surprise = surprise.map(|surprise| floor::picture(&picture::paint_surprise(&state.belief.grid, &surprise)));

@@ -52,7 +52,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             }
         };
         let did = if args.infer { "inferred" } else { "run" };
-        println!("{}: {} of {} steps {did} again, the same {words}", args.episode.display(), report.steps, report.budget);
+        println!(
+            "{}: {} of {} steps {did} again, the same {words}",
+            args.episode.display(),
+            report.steps,
+            report.budget
+        );
     }
     Ok(report.verdict()?)
 }

@@ -280,7 +280,9 @@ fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Momen
             Some(outcome) => outcome.record.scores().copied(),
             None => episode.record().prior.scores,
         },
-        entropy_nats: outcome.as_ref().map_or(episode.record().prior.entropy_nats, |outcome| outcome.record.entropy_nats),
+        entropy_nats: outcome
+            .as_ref()
+            .map_or(episode.record().prior.entropy_nats, |outcome| outcome.record.entropy_nats),
         outcome: outcome.map(Arc::new),
     }
 }

@@ -219,7 +219,13 @@ impl EpisodeDir {
     }
 
     fn at(path: &Path, lock: Option<File>) -> Self {
-        Self { path: path.to_owned(), precision: Precision::default(), frames: Frames::default(), grid: OnceLock::new(), lock }
+        Self {
+            path: path.to_owned(),
+            precision: Precision::default(),
+            frames: Frames::default(),
+            grid: OnceLock::new(),
+            lock,
+        }
     }
 
     /// The directory's path.

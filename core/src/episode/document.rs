@@ -152,3 +152,7 @@ impl serde_json::ser::Formatter for Lines {
 #[cfg(test)]
 #[path = "document_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "format_tests.rs"]
+mod format_tests;

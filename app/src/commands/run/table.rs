@@ -38,7 +38,13 @@ pub(super) fn step(step: &StepRecord, budget: usize) {
     for mishap in mishaps(step) {
         action += &format!(", {mishap}");
     }
-    row(&format!("{}/{budget}", step.index), &action, gain, (step.scores(), step.entropy_nats), Some(step.seconds.total()));
+    row(
+        &format!("{}/{budget}", step.index),
+        &action,
+        gain,
+        (step.scores(), step.entropy_nats),
+        Some(step.seconds.total()),
+    );
 }
 
 fn row(step: &str, action: &str, gain: Option<f32>, state: (Option<&Scores>, f64), seconds: Option<f64>) {

@@ -76,7 +76,10 @@ fn an_exported_episode_is_whole_and_brings_notes_and_verdicts_back() {
         let belief = directory.read_belief(moment.step).expect("belief");
         assert!(belief == moment.belief.belief(), "belief {}", moment.step);
         let truth = directory.read_truth(moment.step).expect("truth");
-        assert_eq!((&truth.occupancy, &truth.labels), moment.truth.as_ref().map(|truth| (&truth.occupancy, &truth.labels)).expect("a truth"));
+        assert_eq!(
+            (&truth.occupancy, &truth.labels),
+            moment.truth.as_ref().map(|truth| (&truth.occupancy, &truth.labels)).expect("a truth")
+        );
     }
     assert_eq!(Annotations::read(&into).expect("notes"), session.annotations);
     assert!(into.join(SUMMARY).metadata().expect("figure").len() > 10_000);

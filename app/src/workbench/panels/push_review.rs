@@ -32,7 +32,8 @@ impl Review {
     pub fn of(id: SessionId, before: &Moment, after: &Moment) -> Self {
         let grid = after.belief.grid();
         let prediction = after.outcome.as_ref().and_then(|outcome| outcome.prediction.as_ref());
-        let changed = before.truth.as_ref().zip(after.truth.as_ref()).map(|(before, after)| before.changed_cells(after));
+        let changed =
+            before.truth.as_ref().zip(after.truth.as_ref()).map(|(before, after)| before.changed_cells(after));
         let predicted = prediction.map(|prediction| predicted_cells(grid, prediction));
         let count = |cells: &[bool]| cells.iter().filter(|cell| **cell).count();
         let both = changed.as_ref().map(|changed| {
@@ -149,7 +150,8 @@ mod tests {
         // Changed and expected to; not changed but rather expected to; half; unknown; outside: one that changed, and others.
         let expected = [0.1_f32, 0.92, 0.69, 0.69, 0.0, 4.6, 0.0, 0.0];
         assert!(surprise.iter().zip(expected).all(|(nats, expected)| (nats - expected).abs() < 0.01), "{surprise:?}");
-        let review = Review { of: (SessionId(0), 1), predicted: Some(2), changed: Some(2), both: Some(1), surprise_nats: None };
+        let review =
+            Review { of: (SessionId(0), 1), predicted: Some(2), changed: Some(2), both: Some(1), surprise_nats: None };
         assert_eq!((review.precision(), review.recall()), (Some(0.5), Some(0.5)));
         let blind = Review { predicted: None, both: Some(0), ..review };
         assert_eq!((blind.precision(), blind.recall()), (None, None));

@@ -299,7 +299,6 @@ impl About<'_> {
         }
         let unknown = words::probability(dirichlet_vacuity(&self.moment.belief.cell(self.cell)));
         let truth = if labels.is_some() { format!("; truth: {}", self.true_class()) } else { String::new() };
-        ui.label(RichText::new(format!("unknown share {unknown}{truth}")).small())
-            .on_hover_text(UNKNOWN_SHARE);
+        ui.label(RichText::new(format!("unknown share {unknown}{truth}")).small()).on_hover_text(UNKNOWN_SHARE);
     }
 }

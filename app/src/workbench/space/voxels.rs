@@ -66,13 +66,11 @@ impl<'a> Voxels<'a> {
                 None | Some(BACKGROUND) => colors::UNKNOWN_RGB,
                 Some(class) => colors::of_class(catalog, class),
             }),
-            ColourBy::Error => {
-                Box::new(move |index| match (belief.probability(index) > 0.5, is_there(index)) {
-                    (true, Some(false)) => colors::HALLUCINATED_RGB,
-                    (false, Some(true)) => colors::MISSED_RGB,
-                    _ => [226, 228, 232],
-                })
-            }
+            ColourBy::Error => Box::new(move |index| match (belief.probability(index) > 0.5, is_there(index)) {
+                (true, Some(false)) => colors::HALLUCINATED_RGB,
+                (false, Some(true)) => colors::MISSED_RGB,
+                _ => [226, 228, 232],
+            }),
             ColourBy::Change => Box::new(move |index| {
                 let change = before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
                 Colormap::Diverging.of(change, [-1.0, 1.0])

@@ -72,7 +72,7 @@ fn an_overruled_verdict_is_marked_and_counted() {
         .expect("a step")
         .record
         .objects()
-        .clone();
+        .to_vec();
     let wrong = objects.iter().find(|object| object.verdict != Verdict::Found).expect("one that was not found");
     let found = objects.iter().filter(|object| object.verdict == Verdict::Found).count();
     assert!(has(&harness, &format!("{found}\u{a0}found")));

@@ -39,7 +39,7 @@ fn recording() -> Recording {
     let episode = synthetic::episode(PolicyKind::Random, 1);
     let (shelf, views) = (episode.simulated().expect("simulated"), episode.views());
     let frame = |view: &View| (view.id, shelf.frame_from(view, &views.intrinsics).frame);
-    Recording(Arc::new(views.views.iter().step_by(3).map(frame).collect()))
+    Recording(Arc::new(views.views.iter().step_by(10).map(frame).collect()))
 }
 
 /// The shelf without anything that is known to stand in it.
@@ -57,7 +57,7 @@ fn run(path: &Path, noise: Option<NoiseModel>) -> Episode {
     while !episode.is_finished() {
         let mut decision = episode.decide();
         if let Action::Look { view } = &mut decision.action {
-            view.0 -= view.0 % 3;
+            view.0 -= view.0 % 10;
         }
         episode.act(decision).expect("an action");
         directory.write(&mut episode).expect("written");
@@ -121,7 +121,7 @@ fn an_action_that_the_environment_refuses_leaves_the_episode_as_it_was() {
     assert!(episode.record().steps.is_empty() && episode.history().actions.is_empty() && episode.told().is_none());
     let mut branch = episode.branch().expect("recordings branch");
     let mut decision = branch.decide();
-    decision.action = Action::Look { view: ViewId(3) };
+    decision.action = Action::Look { view: ViewId(10) };
     branch.act(decision).expect("there is one");
     assert_eq!((branch.record().steps.len(), episode.record().steps.len()), (1, 0));
 }

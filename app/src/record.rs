@@ -12,6 +12,7 @@ pub(crate) mod blueprint;
 mod continued;
 pub(crate) mod decision;
 mod disk;
+pub(crate) mod eye;
 mod floor;
 mod gain;
 pub(crate) mod layout;

@@ -27,6 +27,7 @@ pub mod shot;
 pub mod space;
 pub mod space_layout;
 pub mod tasks;
+pub mod theme;
 pub mod threads;
 pub mod toasts;
 pub mod viewer;

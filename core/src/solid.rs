@@ -80,6 +80,22 @@ impl ConvexPart {
         (planes.len() >= 4).then_some(Self { vertices, triangles, planes })
     }
 
+    /// The edges at which the surface bends by more than `angle`, radians: those that a draughtsman would draw. Ends in the
+    /// body's frame, metres.
+    pub fn creases(&self, angle: f32) -> Vec<[Point; 2]> {
+        let corner = |i: u32| self.vertices[i as usize];
+        let mut sides: std::collections::BTreeMap<[u32; 2], Vec<Vector>> = std::collections::BTreeMap::new();
+        for &[a, b, c] in &self.triangles {
+            let normal = (corner(b) - corner(a)).cross(&(corner(c) - corner(a)));
+            let Some(normal) = normal.try_normalize(1e-12) else { continue };
+            for [from, to] in [[a, b], [b, c], [c, a]] {
+                sides.entry([from.min(to), from.max(to)]).or_default().push(normal);
+            }
+        }
+        let bends = |normals: &[Vector]| !matches!(normals, [a, b] if a.dot(b) > angle.cos());
+        sides.into_iter().filter(|(_, normals)| bends(normals)).map(|(ends, _)| ends.map(corner)).collect()
+    }
+
     /// Whether a point of the body's frame is inside or on the surface.
     pub fn contains(&self, point: Point) -> bool {
         self.planes.iter().all(|plane| plane.normal.dot(&point.coords) <= plane.offset)
@@ -222,5 +238,15 @@ mod tests {
     fn flat_points_make_no_part() {
         let flat = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| Point::new(x, y, 0.0));
         assert!(ConvexPart::hull(&flat).is_none());
+    }
+
+    #[test]
+    fn only_edges_that_bend_are_drawn() {
+        let cube = Solid::standing_box(Vector::new(0.2, 0.1, 0.3));
+        assert_eq!(cube.parts[0].creases(0.5).len(), 12, "of a box its twelve edges, and no diagonal");
+        let turn = |i: usize| i as f32 * std::f32::consts::TAU / 24.0;
+        let ring = |z: f32| (0..24).map(move |i| Point::new(turn(i).cos(), turn(i).sin(), z));
+        let can = ConvexPart::hull(&ring(0.0).chain(ring(2.0)).collect::<Vec<_>>()).expect("a can");
+        assert_eq!(can.creases(0.5).len(), 48, "of a can its two rims");
     }
 }

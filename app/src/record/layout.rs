@@ -2,6 +2,7 @@
 //! and the decision in words.
 
 use super::blueprint::{Layout, Part, View};
+use super::eye::Eye;
 use super::floor::ClassLegend;
 use super::paths;
 use crate::picture::FloorPlan;
@@ -132,27 +133,6 @@ fn within(view: View, [x, y]: [[f64; 2]; 2]) -> View {
 
 fn root_or_slash(root: &str) -> &str {
     if root.is_empty() { "/" } else { root }
-}
-
-/// From where an eye looks, and at what, metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Eye {
-    position: [f32; 3],
-    target: [f32; 3],
-}
-
-impl Eye {
-    /// The whole shelf, in a view that is at least as wide as high.
-    pub(crate) const SHELF: Self = Self { position: [0.0, -0.78, 0.60], target: [0.0, 0.16, 0.11] };
-    /// Beside the robot, so that arm and shelf are both in sight.
-    pub(crate) const ROBOT: Self = Self { position: [1.05, -1.10, 0.85], target: [0.0, -0.22, 0.18] };
-
-    /// The same look from `factor` times as far.
-    #[cfg(feature = "workbench")]
-    pub(crate) fn farther(self, factor: f32) -> Self {
-        let back = |axis: usize| self.target[axis] + factor * (self.position[axis] - self.target[axis]);
-        Self { position: std::array::from_fn(back), ..self }
-    }
 }
 
 /// What is behind the things in three dimensions.

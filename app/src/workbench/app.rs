@@ -285,6 +285,7 @@ impl App {
         }
         match Viewer::new(cc, app.options.serve) {
             Ok((viewer, stream)) => {
+                super::theme::apply(&cc.egui_ctx);
                 app.viewer = Some(viewer);
                 app.model.serving = app.options.serve;
                 app.painter = Some(Arc::new(Mutex::new(Painter::new(stream, app.drawn.clone()))));
@@ -386,6 +387,7 @@ impl App {
         !self.openings.is_empty()
             || self.model.sessions.iter().any(|session| session.activity != Activity::Idle)
             || self.background.is_busy()
+            || self.model.author.is_counting()
             || !self.tasks.under_way().is_empty()
     }
 

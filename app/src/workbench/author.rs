@@ -245,6 +245,11 @@ impl Author {
         &self.hidden
     }
 
+    /// Whether the hidden objects are being counted.
+    pub fn is_counting(&self) -> bool {
+        self.count.is_busy()
+    }
+
     /// Positions of the chosen objects.
     pub fn selection(&self) -> &BTreeSet<usize> {
         &self.selection

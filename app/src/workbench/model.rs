@@ -94,7 +94,7 @@ pub struct Display {
     pub band: [f32; 2],
     /// Voxels between these places along x, y and z are drawn, metres: a slice when two are close.
     pub slice_m: [[f32; 2]; 3],
-    /// The true objects as glass.
+    /// The outlines of the true objects.
     pub truth: bool,
     /// The candidate views as frusta.
     pub views: bool,
@@ -110,11 +110,11 @@ pub const EVERYWHERE_M: [[f32; 2]; 3] = [[-5.0, 5.0]; 3];
 impl Default for Display {
     fn default() -> Self {
         Self {
-            colour_by: ColourBy::Probability,
+            colour_by: ColourBy::Class,
             band: [0.5, 1.0],
             slice_m: EVERYWHERE_M,
             truth: true,
-            views: true,
+            views: false,
             pushes: false,
             robot: false,
         }

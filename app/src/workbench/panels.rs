@@ -122,6 +122,12 @@ fn arrows(ui: &egui::Ui, response: &egui::Response) -> Option<[i32; 2]> {
     })
 }
 
+/// How far something is: words above a bar, for on the bar they could be read on one of its two grounds only.
+fn progress(ui: &mut egui::Ui, share: f32, words: &str) -> egui::Response {
+    let words = ui.label(words);
+    words | ui.add(egui::ProgressBar::new(share).desired_height(6.0))
+}
+
 /// Gives the buttons that follow in `ui` a ground, so that what can be pressed looks like it.
 fn framed(ui: &mut egui::Ui) {
     let visuals = ui.visuals_mut();

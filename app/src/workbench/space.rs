@@ -5,6 +5,7 @@
 //! last one, and remembers which voxel every drawn instance is, for picking.
 
 mod arm;
+mod outlines;
 mod push;
 mod voxels;
 
@@ -12,17 +13,16 @@ use super::half_belief::HalfBelief;
 use super::model::{ColourBy, Display, GainSource, Hovered, LayoutKind, Picked, Preview};
 use super::session::{Moment, Session, SessionId, Setup};
 use super::{space_layout, viewer};
-use crate::colors::{self, Colormap, Rgb};
+use crate::colors::{Colormap, Rgb};
 use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::colored;
-use nudge_core::Pose;
 use nudge_core::belief::Belief;
 use nudge_core::camera::ViewId;
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, Decision};
-use nudge_core::scene::{Body, Catalog, Shelf};
-use nudge_core::solid::ConvexPart;
+use nudge_core::scene::Shelf;
+use outlines::outlines;
 use rerun::{AsComponents, RecordingStream};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -34,7 +34,7 @@ pub mod at {
     pub const SHELF: &str = "shelf/panels";
     /// Its edges.
     pub const EDGES: &str = "shelf/edges";
-    /// The true objects as glass.
+    /// The outlines of the true objects.
     pub const OBJECTS: &str = "objects";
     /// The belief of the shown episode.
     pub const BELIEF: &str = "belief";
@@ -64,7 +64,7 @@ pub mod at {
     pub const GAIN: &str = "gain";
     /// The belief of the second episode.
     pub const OTHER: &str = "other/belief";
-    /// Its true objects.
+    /// The outlines of its true objects.
     pub const OTHER_OBJECTS: &str = "other/objects";
     /// How the two beliefs differ.
     pub const BETWEEN: &str = "between";
@@ -190,7 +190,7 @@ pub struct Painter {
     stream: RecordingStream,
     drawn: Drawn,
     /// The views that are there, how far from the shelf their eyes began, and their ground.
-    layout: Option<(LayoutKind, f32, Ground, bool)>,
+    layout: Option<(LayoutKind, f32, [f32; 3], Ground, bool)>,
     /// What every entity was last drawn from, as words.
     keys: BTreeMap<&'static str, String>,
     /// The last beliefs in full precision.
@@ -206,13 +206,7 @@ impl Painter {
     /// Logs what differs from the last call.
     pub fn paint(&mut self, space: &Space) {
         let ground = if space.light { Ground::Light } else { Ground::Dark };
-        if let Some((views, distance, layout)) = space_layout::of(space.layout, space.aspect, ground, space.shows_arm())
-            && self.layout.replace((views, distance, ground, space.shows_arm()))
-                != Some((views, distance, ground, space.shows_arm()))
-            && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
-        {
-            eprintln!("warning: layout: {error}");
-        }
+        self.lay_out(space, ground);
         let Some(side) = &space.side else { return self.clear_all() };
         self.shelf(side);
         self.objects(side, space);
@@ -232,6 +226,20 @@ impl Painter {
         self.pointer(side, space);
         // What was logged shall be seen at once. This is never the window's own thread.
         let _ = self.stream.flush_blocking();
+    }
+
+    /// Arranges the views, where others are wanted than there are.
+    fn lay_out(&mut self, space: &Space, ground: Ground) {
+        let size = space.side.as_ref().map_or([0.8, 0.4, 0.4], |side| side.shelf.size);
+        let (aspect, arm) = (space_layout::coarse(space.aspect), space.shows_arm());
+        let Some((views, layout)) = space_layout::of(space.layout, aspect, size, ground, arm) else { return };
+        let wanted = Some((views, aspect, size, ground, arm));
+        if self.layout != wanted
+            && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
+        {
+            eprintln!("warning: layout: {error}");
+        }
+        self.layout = wanted;
     }
 
     /// Whether an entity must be drawn anew.
@@ -264,14 +272,16 @@ impl Painter {
         for entity in [at::BELIEF, at::PREDICTED, at::DIFFERENCE, at::HAPPENED, at::GAIN, at::OTHER, at::BETWEEN] {
             self.log_voxels(entity, &grid, Vec::new(), |_| [0; 3]);
         }
-        for entity in [at::ARM_PATH, at::EDGES, at::VIEWS, at::CURRENT, at::HOVERED, at::PICKED] {
+        for entity in
+            [at::ARM_PATH, at::EDGES, at::VIEWS, at::CURRENT, at::HOVERED, at::PICKED, at::OBJECTS, at::OTHER_OBJECTS]
+        {
             self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
         }
         for entity in [at::CANDIDATES, at::CHOSEN] {
             self.log(entity, &push::no_arrows());
         }
         self.log(at::HAPPENED_NOTE, &rerun::Points3D::new(Vec::<[f32; 3]>::new()));
-        for entity in [at::SHELF, at::OBJECTS, at::OTHER_OBJECTS, at::ARM] {
+        for entity in [at::SHELF, at::ARM] {
             self.log(entity, &nothing());
         }
         self.keys.clear();
@@ -298,11 +308,9 @@ impl Painter {
 
     fn objects(&mut self, side: &Side, space: &Space) {
         let shown = space.display.truth.then_some(&side.moment.bodies);
-        if self.differs(at::OBJECTS, format!("{:?}", shown.map(|bodies| (side.id, Arc::as_ptr(bodies))))) {
-            match shown {
-                Some(bodies) => self.log(at::OBJECTS, &glass(bodies, &side.setup.catalog)),
-                None => self.log(at::OBJECTS, &nothing()),
-            }
+        let key = format!("{:?} {}", shown.map(|bodies| (side.id, Arc::as_ptr(bodies))), space.light);
+        if self.differs(at::OBJECTS, key) {
+            self.log(at::OBJECTS, &outlines(shown.map_or(&[], |bodies| bodies), space.light));
         }
     }
 
@@ -375,7 +383,11 @@ impl Painter {
                 Voxels { belief: &b, truth: other.moment.truth.as_deref(), catalog: &other.setup.catalog }
                     .drawn(&space.display, None);
             self.log_voxels(at::OTHER, &b.grid, voxels, rgb);
-            self.log(at::OTHER_OBJECTS, &glass(&other.moment.bodies, &other.setup.catalog));
+        }
+        let shown = space.display.truth.then_some(&other.moment.bodies);
+        let outlined = format!("{:?} {}", shown.map(|bodies| (other.id, Arc::as_ptr(bodies))), space.light);
+        if self.differs(at::OTHER_OBJECTS, outlined) {
+            self.log(at::OTHER_OBJECTS, &outlines(shown.map_or(&[], |bodies| bodies), space.light));
         }
         if self.differs(at::BETWEEN, format!("{:?} {key}", side.key())) {
             let a = self.full(side.key(), &side.moment.belief);
@@ -423,47 +435,6 @@ impl Painter {
 fn thinned(voxels: Vec<usize>) -> Vec<usize> {
     let step = voxels.len().div_ceil(MOST_VOXELS).max(1);
     if step == 1 { voxels } else { voxels.into_iter().step_by(step).collect() }
-}
-
-fn glass(bodies: &[Body], catalog: &Catalog) -> rerun::Mesh3D {
-    let mut facets = Facets::default();
-    for body in bodies {
-        let [r, g, b] = colors::of_class(catalog, body.class);
-        let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, shapes::GLASS_ALPHA);
-        facets.add(&body.solid.parts, &body.world_from_body, color);
-    }
-    facets.mesh(shapes::GLASS_ALPHA)
-}
-
-/// Coloured triangles of solids, on their way to one mesh.
-#[derive(Default)]
-struct Facets {
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    colors: Vec<rerun::Rgba32>,
-}
-
-impl Facets {
-    fn add(&mut self, parts: &[ConvexPart], world_from_parts: &Pose, color: rerun::Rgba32) {
-        for (position, normal) in shapes::facets(parts) {
-            self.positions.push((world_from_parts * position).coords.into());
-            self.normals.push((world_from_parts * normal).into());
-            self.colors.push(color);
-        }
-    }
-
-    /// `alpha` is that of the whole: 255 for what covers what was drawn see-through before.
-    fn mesh(self, alpha: u8) -> rerun::Mesh3D {
-        if self.positions.is_empty() {
-            return nothing();
-        }
-        let triangles = (0..self.positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
-        rerun::Mesh3D::new(self.positions)
-            .with_vertex_normals(self.normals)
-            .with_vertex_colors(self.colors)
-            .with_triangle_indices(triangles)
-            .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, alpha))
-    }
 }
 
 /// A mesh that cannot be seen.

@@ -3,38 +3,39 @@
 use super::model::LayoutKind;
 use super::space::at;
 use crate::record::blueprint::{Layout, Part};
-use crate::record::layout::{Eye, Ground, spatial};
+use crate::record::eye::Eye;
+use crate::record::layout::{Ground, spatial};
 
-/// Width over height from which on a view shows the whole shelf with the eye where it is by default.
+/// Width over height from which on a view shows the whole shelf with the eye beside the robot.
 const WHOLE_SHELF: f32 = 1.05;
 
-/// How far the eye has to be for the whole shelf to show in a view, as a factor of where it is by default; in coarse
-/// steps, so that a window that is made a little wider leaves the eye where a person has turned it.
-fn distance(aspect: f32) -> f32 {
+/// Width over height in coarse steps, rounded down, so that a window that is made a little wider leaves the eye where a
+/// person has turned it.
+pub(crate) fn coarse(aspect: f32) -> f32 {
     const STEP: f32 = 1.1;
-    let needed = (WHOLE_SHELF / aspect.clamp(0.2, 5.0)).max(1.0);
-    STEP.powf((needed.ln() / STEP.ln()).ceil())
+    STEP.powf((aspect.clamp(0.2, 8.0).ln() / STEP.ln()).floor())
 }
 
-/// The views of a layout with the first layout that has the same ones, and the distance of their eyes; `None` where it
-/// has none. `aspect` is width over height of the place for all of them together. With the robot in them they are seen
-/// from beside it, or it would stand in the way.
-pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -> Option<(LayoutKind, f32, Layout)> {
-    let distance = distance(match layout {
-        LayoutKind::Compare => aspect / 3.0,
-        _ => aspect,
-    });
-    let eye = if robot { Eye::ROBOT } else { Eye::SHELF };
-    let always = [at::SHELF, at::EDGES];
-    let view = |name: &str, shown: &[&str]| {
-        Part::View(spatial(
-            name,
-            "",
-            eye.farther(distance),
-            ground,
-            always.iter().chain(shown).map(|path| format!("/{path}")).collect(),
-        ))
+/// The views of a layout with the first layout that has the same ones; `None` where it has none. `aspect` is width over
+/// height of the place for all of them together, `size` the shelf's, metres. With the robot in them they are seen from
+/// beside it, or it would stand in the way.
+pub(crate) fn of(
+    layout: LayoutKind,
+    aspect: f32,
+    size: [f32; 3],
+    ground: Ground,
+    robot: bool,
+) -> Option<(LayoutKind, Layout)> {
+    let eye_of = |aspect: f32| match robot {
+        true => Eye::ROBOT.farther((WHOLE_SHELF / aspect).max(1.0)),
+        false => Eye::framing(size, aspect),
     };
+    let always = [at::SHELF, at::EDGES];
+    let view_of = |aspect: f32, name: &str, shown: &[&str]| {
+        let shown = always.iter().chain(shown).map(|path| format!("/{path}")).collect();
+        Part::View(spatial(name, "", eye_of(aspect), ground, shown))
+    };
+    let view = |name: &str, shown: &[&str]| view_of(aspect, name, shown);
     let pointer = [at::HOVERED, at::PICKED];
     let root = match layout {
         LayoutKind::Episode | LayoutKind::Why => view(
@@ -75,13 +76,20 @@ pub(crate) fn of(layout: LayoutKind, aspect: f32, ground: Ground, robot: bool) -
                 ]),
             ),
         ]),
-        LayoutKind::Compare => Part::Row(vec![
-            (1.0, view("A", &[at::BELIEF, at::OBJECTS, at::CHOSEN, at::PICKED])),
-            (1.0, view("B", &[at::OTHER, at::OTHER_OBJECTS])),
-            (1.0, view("A - B", &[at::BETWEEN, at::OBJECTS, at::PICKED])),
-        ]),
+        LayoutKind::Compare => {
+            // Three in a row where that leaves each at least as wide as high, else the difference below the two.
+            let is_row = aspect >= 3.0;
+            let [of_two, of_difference] = if is_row { [aspect / 3.0; 2] } else { [aspect, 2.0 * aspect] };
+            let a = view_of(of_two, "A", &[at::BELIEF, at::OBJECTS, at::CHOSEN, at::PICKED]);
+            let b = view_of(of_two, "B", &[at::OTHER, at::OTHER_OBJECTS]);
+            let difference = view_of(of_difference, "A - B", &[at::BETWEEN, at::OBJECTS, at::PICKED]);
+            match is_row {
+                true => Part::Row(vec![(1.0, a), (1.0, b), (1.0, difference)]),
+                false => Part::Column(vec![(1.0, Part::Row(vec![(1.0, a), (1.0, b)])), (1.0, difference)]),
+            }
+        }
         LayoutKind::Author => return None,
     };
     let same = if layout == LayoutKind::Why { LayoutKind::Episode } else { layout };
-    Some((same, distance, Layout { root }))
+    Some((same, Layout { root }))
 }

@@ -83,10 +83,8 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
                         }
                     }
                     for step in last + 1..=session.record.config.budget {
-                        ui.add_enabled(
-                            false,
-                            egui::Label::new(egui::RichText::new(step.to_string()).monospace().weak()),
-                        );
+                        ui.label(egui::RichText::new(step.to_string()).monospace().weak())
+                            .on_hover_text("Not done yet");
                     }
                 });
             });

@@ -68,7 +68,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         }
     });
     ui.horizontal_wrapped(|ui| {
-        ui.checkbox(&mut display.truth, "truth").on_hover_text("The true objects as glass");
+        ui.checkbox(&mut display.truth, "truth").on_hover_text("The outlines of the true objects");
         ui.checkbox(&mut display.views, "views").on_hover_text("The candidate views as frusta, coloured by gain");
         ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
         if layout != LayoutKind::Compare {
@@ -82,7 +82,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
             let (name, unit) = if layout == LayoutKind::Push {
                 ("predicted minus now", "difference of probability")
             } else {
-                ("A minus B", "difference of probability, A − B")
+                ("A minus B", "probability, A − B")
             };
             scale(ui, Colormap::Diverging, name, ["−1", "+1"], unit);
         }

@@ -22,7 +22,7 @@ pub fn openings(ui: &mut egui::Ui, openings: &[(SessionId, String, Activity)], a
         ui.label(format!("Opening {title}"));
         match activity {
             Activity::Opening { done, of } if *of > 0 => {
-                ui.add(egui::ProgressBar::new(*done as f32 / *of as f32).text(format!("step {done} of {of}")));
+                super::progress(ui, *done as f32 / *of as f32, &format!("step {done} of {of}"));
             }
             _ => {
                 ui.add(egui::Spinner::new());
@@ -109,8 +109,8 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
         Activity::Acting => "acting…",
         Activity::Running => "running…",
     };
-    let bar = egui::ProgressBar::new(steps as f32 / budget.max(1) as f32).text(format!("{steps}/{budget}  {doing}"));
-    ui.add(bar).on_hover_text("Actions done of the budget");
+    let words = format!("{steps} of {budget} actions · {doing}");
+    super::progress(ui, steps as f32 / budget.max(1) as f32, &words).on_hover_text("Actions done of the budget");
 }
 
 fn form(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {

@@ -9,6 +9,7 @@ use crate::workbench::browser::{Browser, Entry, Look};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::latest::Wake;
 use crate::workbench::model::{LayoutKind, Model};
+use crate::workbench::theme::LEAST_SIZE;
 use re_viewer::external::egui::{self, Color32, FontId, Pos2, Rect, Sense, StrokeKind, Vec2, WidgetInfo, WidgetType};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -234,10 +235,10 @@ fn draw(ui: &egui::Ui, rect: Rect, response: &egui::Response, entry: &mut Entry,
             let below = line(&painter, text.min, &facts.name, 13.5, ink, text.width(), 1);
             let weak = visuals.weak_text_color();
             let about = Pos2::new(text.left(), below + 1.0);
-            line(&painter, about, &facts.description, 11.0, weak, text.width(), 2);
+            line(&painter, about, &facts.description, LEAST_SIZE, weak, text.width(), 2);
             let foot = Pos2::new(text.left(), text.bottom() - 13.0);
             let known = counts(facts.objects, facts.hidden);
-            line(&painter, foot, &known, 11.0, visuals.text_color(), text.width(), 1);
+            line(&painter, foot, &known, LEAST_SIZE, visuals.text_color(), text.width(), 1);
         }
         Look::Broken(error) => {
             let red = visuals.error_fg_color;
@@ -245,7 +246,7 @@ fn draw(ui: &egui::Ui, rect: Rect, response: &egui::Response, entry: &mut Entry,
             let name = entry.path.file_name().unwrap_or_default().to_string_lossy();
             let below = line(&painter, place, &format!("⚠ {name}"), 13.5, red, text.width(), 1);
             let below = Pos2::new(place.x, below + 4.0);
-            line(&painter, below, error, 11.5, visuals.text_color(), text.width(), 9);
+            line(&painter, below, error, LEAST_SIZE, visuals.text_color(), text.width(), 9);
         }
     }
     let outline = |stroke: egui::Stroke| painter.rect_stroke(rect, radius, stroke, StrokeKind::Outside);

@@ -1,9 +1,11 @@
 //! The arm before the shelf: where it is in a step's motion, and the way of its tip.
 
-use super::{Facets, Painter, Side, Space, at, nothing};
+use super::{Painter, Side, Space, at, nothing, shapes};
 use crate::record::robot;
+use nudge_core::Pose;
 use nudge_core::arm::{ArmTool, Joints, Motion, Role, pose_of};
 use nudge_core::plan::Action;
+use nudge_core::solid::ConvexPart;
 
 impl Painter {
     /// Draws the arm where the scrubbed motion has it, else where the step left it to be seen.
@@ -44,4 +46,35 @@ fn links(arm: &ArmTool, joints: &Joints) -> rerun::Mesh3D {
         facets.add(std::slice::from_ref(&part.shape), &pose_of(&poses[body]), color);
     }
     facets.mesh(255)
+}
+
+/// Coloured triangles of solids, on their way to one mesh.
+#[derive(Default)]
+struct Facets {
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    colors: Vec<rerun::Rgba32>,
+}
+
+impl Facets {
+    fn add(&mut self, parts: &[ConvexPart], world_from_parts: &Pose, color: rerun::Rgba32) {
+        for (position, normal) in shapes::facets(parts) {
+            self.positions.push((world_from_parts * position).coords.into());
+            self.normals.push((world_from_parts * normal).into());
+            self.colors.push(color);
+        }
+    }
+
+    /// `alpha` is that of the whole: 255 for what covers what was drawn see-through before.
+    fn mesh(self, alpha: u8) -> rerun::Mesh3D {
+        if self.positions.is_empty() {
+            return nothing();
+        }
+        let triangles = (0..self.positions.len() as u32 / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]);
+        rerun::Mesh3D::new(self.positions)
+            .with_vertex_normals(self.normals)
+            .with_vertex_colors(self.colors)
+            .with_triangle_indices(triangles)
+            .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, alpha))
+    }
 }

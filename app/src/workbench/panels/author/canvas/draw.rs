@@ -3,6 +3,7 @@
 use super::super::colour;
 use super::Board;
 use crate::workbench::author::{Author, Gesture};
+use crate::workbench::theme::LEAST_SIZE;
 use nudge_core::scene::Shelf;
 use re_viewer::external::egui::{
     self, Align2, Color32, CornerRadius, FontId, Painter, Pos2, Rect, Shape, Stroke, StrokeKind, Vec2,
@@ -13,8 +14,8 @@ const GRID_M: f32 = 0.1;
 /// Distance of the lines of a hatch, points.
 const HATCH: f32 = 7.0;
 const WALL: f32 = 6.0;
-/// Names smaller than this cannot be read.
-const NAME_SIZES: [f32; 3] = [12.5, 11.0, 9.5];
+/// Sizes of names; those that fit in none are told on hover only.
+const NAME_SIZES: [f32; 2] = [13.0, LEAST_SIZE];
 
 /// The colours of the canvas that are no class's.
 pub(super) struct Ink {
@@ -56,7 +57,7 @@ pub(super) fn ground(painter: &Painter, ink: &Ink, board: &Board, shelf: &Shelf)
     let rect = board.rect;
     painter.rect_filled(rect, 0.0, ink.board);
     let [width, depth, _] = shelf.size;
-    let font = FontId::proportional(11.0);
+    let font = FontId::proportional(LEAST_SIZE);
     let first = (-0.5 * width / GRID_M).ceil() as i32;
     for i in first..=-first {
         let x = i as f32 * GRID_M;
@@ -285,7 +286,13 @@ pub(super) fn ghost(painter: &Painter, ink: &Ink, points: Vec<Pos2>, fill: Color
 
 /// Numbers at the top right.
 pub(super) fn readout(painter: &Painter, ink: &Ink, space: Rect, text: &str) {
-    painter.text(space.right_top() + Vec2::new(-8.0, 8.0), Align2::RIGHT_TOP, text, FontId::monospace(11.5), ink.weak);
+    painter.text(
+        space.right_top() + Vec2::new(-8.0, 8.0),
+        Align2::RIGHT_TOP,
+        text,
+        FontId::monospace(LEAST_SIZE),
+        ink.weak,
+    );
 }
 
 /// What to do where there is nothing.

@@ -19,14 +19,16 @@ mod npz;
 mod record;
 mod replay;
 mod resume;
+mod stopwatch;
 #[cfg(test)]
 mod synthetic;
 mod told_file;
 
 pub use directory::{DirectoryState, EpisodeDir, Frames, Overwrite};
+pub use estimate::Told;
 pub use infer::infer;
 pub use judgement::{Judgement, NO_TRUTH, Prior};
-pub use machine::{Episode, Told};
+pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
 pub use record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,

@@ -15,7 +15,8 @@
 //! that a new run may start in.
 
 use super::checkpoint::Checkpoint;
-use super::machine::{Episode, Told};
+use super::estimate::Told;
+use super::machine::Episode;
 use super::npz::{self, Precision, StoredTruth};
 use super::record::{EpisodeRecord, StepRecord};
 use super::told_file;

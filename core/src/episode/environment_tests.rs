@@ -5,7 +5,7 @@ use super::super::{Agreement, EpisodeDir, Overwrite, infer, replay, resume, revi
 use super::*;
 use crate::arm::Arm;
 use crate::belief::Classical;
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, NoiseModel};
 use crate::plan::PolicyKind;
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -2,10 +2,21 @@
 //!
 //! Both a running episode and [`infer`](super::infer()) go through here, so that a belief can be had again from what is filed.
 
+use super::record::EpisodeRecord;
+use crate::Result;
 use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, SweptPush, look};
-use crate::camera::MapObservation;
+use crate::camera::{Frame, MapObservation, NoiseModel, Sensed, View};
 use crate::grid::Grid;
 use std::sync::Arc;
+
+/// What a belief update was told: all that it takes to have the belief again.
+#[derive(Clone, Debug)]
+pub enum Told {
+    /// After a look what the environment gave, with the pose where the camera was thought to be; noise is not in its pixels.
+    Frame(Sensed),
+    /// After a push as far as it came what the arm swept.
+    Push(SweptPush),
+}
 
 /// Belief and sightings. Cheap to clone.
 #[derive(Clone)]
@@ -45,4 +56,17 @@ impl Estimate {
         }
         prediction
     }
+}
+
+/// A frame with the noise of the next step, the same for whoever asks: the oracle sees the very frame that a look would give.
+pub(super) fn sense(
+    record: &EpisodeRecord,
+    view: &View,
+    shoot: impl FnOnce(&View) -> Result<Sensed>,
+) -> Result<(Sensed, Frame)> {
+    let noise = record.config.noise.unwrap_or(NoiseModel::OFF);
+    let (seed, step) = (record.config.seed, record.steps.len() as u64 + 1);
+    let sensed = noise.aim(view, seed, step, shoot)?;
+    let frame = noise.apply(&sensed, seed, step);
+    Ok((sensed, frame))
 }

@@ -1,7 +1,8 @@
 //! Looking at an episode whose shelf cannot be simulated: everything is as it is filed.
 
 use super::directory::EpisodeDir;
-use super::machine::{Episode, Told};
+use super::estimate::Told;
+use super::machine::Episode;
 use super::record::{StepOutcome, StepRecord};
 use super::resume::{Absent, Observer};
 use crate::arm::{Arm, PushMotion};

@@ -1,8 +1,7 @@
 //! Inferring an episode's beliefs again from its filed frames, without simulating anything.
 
 use super::directory::EpisodeDir;
-use super::estimate::Estimate;
-use super::machine::Told;
+use super::estimate::{Estimate, Told};
 use super::record::EpisodeRecord;
 use super::replay::{Comparison, ReplayReport, tolerance};
 use crate::Result;

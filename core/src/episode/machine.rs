@@ -1,14 +1,14 @@
 //! The episode as a state machine.
 
-use super::estimate::Estimate;
+use super::estimate::{Estimate, Told, sense};
 use super::judgement::{Judgement, Prior, entropy_nats};
-use super::npz::StoredTruth;
 use super::record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
+use super::stopwatch::Stopwatch;
 use crate::arm::{Arm, ArmTool, HandPose, Motion, Push, PushMotion};
 use crate::belief::{Belief, BeliefUpdate, SweptPush};
-use crate::camera::{Frame, MapObservation, NoiseModel, Sensed, View, ViewArray, ViewId, project};
+use crate::camera::{Frame, MapObservation, Sensed, View, ViewArray, ViewId, project};
 use crate::environment::{Environment, Simulated};
 use crate::grid::{Grid, VoxelSet};
 use crate::made_by::{Build, MadeBy};
@@ -19,8 +19,9 @@ use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::world::{PushOutcome, TruthMap};
 use crate::{Error, Result};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
+
+mod log;
 
 /// A running episode.
 pub struct Episode {
@@ -44,15 +45,6 @@ pub struct Episode {
     deciding: Stopwatch,
     /// What the last belief update was told.
     told: Option<Told>,
-}
-
-/// What a belief update was told: all that it takes to have the belief again.
-#[derive(Clone, Debug)]
-pub enum Told {
-    /// After a look what the environment gave, with the pose where the camera was thought to be; noise is not in its pixels.
-    Frame(Sensed),
-    /// After a push as far as it came what the arm swept.
-    Push(SweptPush),
 }
 
 impl Episode {
@@ -367,23 +359,6 @@ impl Episode {
         }
     }
 
-    /// Takes the seconds and the version of a log whose actions this episode has repeated.
-    pub(super) fn adopt_log(&mut self, logged: EpisodeRecord) {
-        self.record = logged;
-    }
-
-    /// Replaces the repeated prior or last step by the one of a log, with belief and truth from the files. Which object
-    /// stands where is taken from the repeated truth if the files do not tell.
-    pub(super) fn adopt_state(&mut self, logged: &EpisodeRecord, belief: Belief, truth: Option<StoredTruth>) {
-        self.record.prior = logged.prior;
-        if let Some(step) = self.record.steps.last_mut() {
-            *step = logged.steps[step.index - 1].clone();
-        }
-        self.estimate.belief = Arc::new(belief);
-        let repeated = || self.truth().map(|truth| truth.objects.clone());
-        self.filed_truth = truth.map(|truth| Arc::new(truth.into_map(repeated)));
-    }
-
     /// Whether the budget is used up.
     pub fn is_finished(&self) -> bool {
         self.record.steps.len() >= self.record.config.budget
@@ -422,26 +397,6 @@ impl Episode {
 
     pub(super) fn estimate(&self) -> &Estimate {
         &self.estimate
-    }
-
-    /// Adds a step of a log with the estimate after it.
-    pub(super) fn take_note(&mut self, step: &StepRecord, estimate: Estimate) {
-        self.history.record(&step.decision, !step.dropped().is_empty());
-        self.record.steps.push(step.clone());
-        self.estimate = estimate;
-    }
-
-    /// Takes over the state at the end of a log.
-    pub(super) fn adopt(
-        &mut self,
-        environment: Box<dyn Environment>,
-        estimate: Estimate,
-        history: History,
-        hand: Option<HandPose>,
-        logged: EpisodeRecord,
-    ) {
-        (self.environment, self.estimate, self.history, self.hand) = (environment, estimate, history, hand);
-        self.record = logged;
     }
 
     /// What the last belief update was told; `None` before the first action.
@@ -524,15 +479,6 @@ fn check(scene: &Scene, config: &EpisodeConfig, update: &dyn BeliefUpdate) -> Re
     ViewArray::named(&config.views).map(drop)
 }
 
-/// A frame with the noise of the next step, the same for whoever asks: the oracle sees the very frame that a look would give.
-fn sense(record: &EpisodeRecord, view: &View, shoot: impl FnOnce(&View) -> Result<Sensed>) -> Result<(Sensed, Frame)> {
-    let noise = record.config.noise.unwrap_or(NoiseModel::OFF);
-    let (seed, step) = (record.config.seed, record.steps.len() as u64 + 1);
-    let sensed = noise.aim(view, seed, step, shoot)?;
-    let frame = noise.apply(&sensed, seed, step);
-    Ok((sensed, frame))
-}
-
 /// What an action brought beside its belief.
 #[derive(Default)]
 struct Happened {
@@ -540,26 +486,6 @@ struct Happened {
     displacement_m: f64,
     motion_s: f64,
     push: Option<PushReport>,
-}
-
-/// Seconds that deciding took, kept from `decide`, which changes nothing else, to `act`.
-#[derive(Debug, Default)]
-struct Stopwatch(AtomicU64);
-
-impl Stopwatch {
-    fn set(&self, seconds: f64) {
-        self.0.store(seconds.to_bits(), Ordering::Relaxed);
-    }
-
-    fn take(&self) -> f64 {
-        f64::from_bits(self.0.swap(0, Ordering::Relaxed))
-    }
-}
-
-impl Clone for Stopwatch {
-    fn clone(&self) -> Self {
-        Self(AtomicU64::new(self.0.load(Ordering::Relaxed)))
-    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 use super::super::synthetic;
 use super::*;
 use crate::belief::CHANGED;
+use crate::camera::NoiseModel;
 use crate::plan::{PlannerSettings, PolicyKind, Reason};
 use crate::score::{Scores, Verdict};
 

@@ -3,7 +3,7 @@
 //! A push is filed as the voxels that the arm swept, one bit each and compressed (Zstandard), behind a first line of JSON with
 //! the push as far as it came. Frames are [`Sensed::to_bytes`].
 
-use super::machine::Told;
+use super::estimate::Told;
 use crate::arm::Push;
 use crate::belief::SweptPush;
 use crate::camera::Sensed;

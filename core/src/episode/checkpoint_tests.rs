@@ -67,6 +67,7 @@ fn a_run_that_is_killed_after_every_action_comes_to_the_same_end_to_the_bit() {
     let (ours, theirs) = (episode.simulated().expect("simulated"), expected.simulated().expect("simulated"));
     assert_eq!(ours.world().standing(), theirs.world().standing());
     directory.finish().expect("cleaned up");
+    drop(directory);
     assert!(!killed.join("checkpoints").exists() && go_on(&killed).is_none());
 }
 

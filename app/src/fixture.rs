@@ -3,7 +3,7 @@
 use nudge_core::arm::ArmTool;
 use nudge_core::belief::{Belief, BeliefUpdate, Classical, SweptPush};
 use nudge_core::camera::{self, ViewArray, ViewId};
-use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
+use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, Judgement, StepOutcome, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
 use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng;
@@ -77,23 +77,26 @@ pub fn play(steps: usize) -> Played {
                 outcome = Some((swept, prediction, pushed));
             }
         }
-        let mut image = None;
+        let mut frame = None;
         let mut observation = None;
         if let Action::Look { view } = decision.action {
             let view = played.views.view(view).expect("view");
-            let taken = camera::render(&shelf, &world.bodies(), view, &played.views.intrinsics);
-            let seen = camera::project(&taken, view, &played.views.intrinsics, &shelf);
+            let taken = camera::render(&shelf, &world.bodies(), view, &played.views.intrinsics).frame;
+            let seen = camera::project(&taken, &shelf);
             belief = Classical.observe(&belief, &seen);
-            (image, observation) = (Some(taken), Some(seen));
+            (frame, observation) = (Some(taken), Some(seen));
         }
         let step = StepRecord {
             index,
             action: decision.action,
             decision,
-            scores: Scores::of(&belief, &truth),
-            objects: object_verdicts(&belief, &truth, &played.catalog),
-            dropped: Vec::new(),
-            displacement_m: 0.0,
+            entropy_nats: Scores::of(&belief, &truth).entropy_nats,
+            judgement: Some(Judgement {
+                scores: Scores::of(&belief, &truth),
+                objects: object_verdicts(&belief, &truth, &played.catalog),
+                dropped: Vec::new(),
+                displacement_m: 0.0,
+            }),
             motion_s: 0.0,
             push: None,
             seconds: StepSeconds::default(),
@@ -105,7 +108,7 @@ pub fn play(steps: usize) -> Played {
         };
         played.outcomes.push(StepOutcome {
             record: step,
-            image,
+            frame,
             observation,
             swept,
             prediction,
@@ -117,6 +120,15 @@ pub fn play(steps: usize) -> Played {
         played.truths.push(truth.clone());
     }
     played
+}
+
+/// The same as a log of an episode whose truth nobody knows.
+pub fn without_truth(record: &EpisodeRecord) -> EpisodeRecord {
+    let mut record = record.clone();
+    record.scene.objects.clear();
+    record.prior.scores = None;
+    record.steps.iter_mut().for_each(|step| step.judgement = None);
+    record
 }
 
 fn record(scene: Scene, prior: Scores, budget: usize) -> EpisodeRecord {
@@ -135,7 +147,7 @@ fn record(scene: Scene, prior: Scores, budget: usize) -> EpisodeRecord {
             planner: PlannerSettings::default(),
             noise: None,
         },
-        prior,
+        prior: prior.into(),
         steps: Vec::new(),
     }
 }

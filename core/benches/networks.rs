@@ -28,9 +28,7 @@ fn main() {
     let update = cnabu::load(&cnabu::models_dir().expect("models/")).expect("weights");
 
     let observations: Vec<_> = (views.views.iter().step_by(37))
-        .map(|view| {
-            project(&render(&scene.shelf, &bodies, view, &views.intrinsics), view, &views.intrinsics, &scene.shelf)
-        })
+        .map(|view| project(&render(&scene.shelf, &bodies, view, &views.intrinsics).frame, &scene.shelf))
         .collect();
     let belief = observations.iter().fold(Belief::uniform(scene.grid()), |belief, seen| update.observe(&belief, seen));
     row("sigma_o, one observation", median(31, || update.observe(&belief, &observations[0])), 0.06);

@@ -31,12 +31,12 @@ fn main() {
     let view = array.view(ViewId(145)).expect("view");
     let image = median(9, || render(&scene.shelf, &bodies, view, &array.intrinsics));
     row("image, depth and labels, 640 x 480", image, None);
-    let picture = render(&scene.shelf, &bodies, view, &array.intrinsics);
-    let projection = median(9, || project(&picture, view, &array.intrinsics, &scene.shelf));
+    let picture = render(&scene.shelf, &bodies, view, &array.intrinsics).frame;
+    let projection = median(9, || project(&picture, &scene.shelf));
     row("observation: image and projection", image + projection, Some(0.15));
     row("truth map", median(9, || TruthMap::of(&grid, &bodies)), Some(0.05));
     let belief = nudge_core::belief::Belief::uniform(grid);
-    let observation = project(&picture, view, &array.intrinsics, &scene.shelf);
+    let observation = project(&picture, &scene.shelf);
     row("classical belief update", median(9, || Classical.observe(&belief, &observation)), None);
 
     let fifteen = fifteen_objects(&catalog);

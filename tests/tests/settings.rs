@@ -36,7 +36,7 @@ const WRONG: [(&str, &str, &str); 8] = [
     ("--quiet-steps", "1.5", "--quiet-steps 1.5: must be a whole number of steps from 0 to 1000"),
     ("--saturation", "-0.1", "--saturation -0.1: must be a share from 0 to 1"),
     ("--gain", "some", "--gain some: must be all or unseen"),
-    ("--noise", "l515", "unknown noise \"l515\"; there are none, standard"),
+    ("--noise", "d435", "unknown noise \"d435\"; there are none, standard, l515"),
 ];
 
 #[test]

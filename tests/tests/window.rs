@@ -280,7 +280,7 @@ fn export_of(episode: &Path, into: &Path) -> nudge::workbench::session::Session 
         std::thread::sleep(Duration::from_millis(5));
     }
     let last = harness.state().model.session().expect("open").steps();
-    let object = harness.state().model.session().expect("open").record.steps[last - 1].objects[0].clone();
+    let object = harness.state().model.session().expect("open").record.steps[last - 1].objects()[0].clone();
     harness.state_mut().ask(Ask::Note(last, "the stock viewer shows this".to_owned()));
     let name = nudge::verdicts::object_name(&object);
     harness.state_mut().ask(Ask::Overrule(last, name, Some(nudge_core::score::Verdict::Misclassified)));

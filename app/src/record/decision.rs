@@ -22,6 +22,13 @@ pub struct Series {
     pub value: fn(&Scores) -> f64,
 }
 
+impl Series {
+    /// Its value in a state; without a truth there is the entropy alone.
+    pub fn at(&self, scores: Option<&Scores>, entropy_nats: f64) -> Option<f64> {
+        scores.map(self.value).or_else(|| (self.key == "entropy_nats").then_some(entropy_nats))
+    }
+}
+
 /// The scores that are recorded.
 pub const SERIES: &[Series] = &[
     Series {
@@ -71,14 +78,13 @@ pub const SERIES: &[Series] = &[
 /// How many views and pushes the tables list.
 const LISTED: usize = 5;
 
-/// The scores in one line.
-pub fn scores_line(scores: &Scores) -> String {
-    format!(
-        "IoU {:.3}, mIoU {:.3}, entropy {} nats",
-        scores.occupancy_iou,
-        scores.semantic_miou,
-        thousands(scores.entropy_nats)
-    )
+/// The scores in one line; without a truth the entropy alone.
+pub fn scores_line(scores: Option<&Scores>, entropy_nats: f64) -> String {
+    let entropy = format!("entropy {} nats", thousands(entropy_nats));
+    match scores {
+        Some(scores) => format!("IoU {:.3}, mIoU {:.3}, {entropy}", scores.occupancy_iou, scores.semantic_miou),
+        None => entropy,
+    }
 }
 
 /// A step in one line.
@@ -88,13 +94,13 @@ pub fn line(record: &StepRecord) -> String {
         record.index,
         action(&record.action),
         record.decision.reason.words(),
-        scores_line(&record.scores)
+        scores_line(record.scores(), record.entropy_nats)
     )
 }
 
 /// What went wrong in a step, one line each.
 pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
-    let mut words: Vec<String> = record.dropped.iter().map(|name| format!("dropped {name}")).collect();
+    let mut words: Vec<String> = record.dropped().iter().map(|name| format!("dropped {name}")).collect();
     if let Some(push) = &record.push {
         if push.stalled {
             words.push(format!("the arm was blocked after {} of its push", length(record).unwrap_or_default()));
@@ -136,7 +142,11 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     weighed(&mut page, &decision.comparison());
     views(&mut page, setting, decision);
     pushes(&mut page, decision);
-    let scores = &record.scores;
+    let Some(scores) = record.scores() else {
+        let entropy = thousands(record.entropy_nats);
+        let _ = write!(page, "**After the step**\n\n| entropy, nats |\n|--:|\n| {entropy} |\n");
+        return page;
+    };
     let _ = write!(
         page,
         "**After the step**\n\n| occupancy IoU | occupied IoU | semantic mIoU | entropy, nats |\n|--:|--:|--:|--:|\n\

@@ -35,14 +35,15 @@ fn a_recording_stays_small_and_names_its_entities() {
     let mut recorder = Recorder::begin(&path, "test", &setting).expect("file");
     let mut sizes = Vec::new();
     for step in 0..=steps {
-        let scores = step.checked_sub(1).map_or(&played.record.prior, |at| &played.record.steps[at].scores);
+        let scores = played.record.scores_after(step);
         let state = State {
             step,
             bodies: &played.bodies[step],
             belief: &played.beliefs[step],
             seen: &VoxelSet::empty(&played.beliefs[step].grid),
-            truth: &played.truths[step],
+            truth: Some(&played.truths[step]),
             scores,
+            entropy_nats: played.record.entropy_after(step),
         };
         recorder.state(&setting, &state).expect("state");
         if let Some(outcome) = step.checked_sub(1).map(|at| &played.outcomes[at]) {

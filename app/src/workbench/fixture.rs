@@ -71,7 +71,7 @@ impl Script {
             unreachable: Arc::new(episode.unreachable_views().to_vec()),
             hidden: Arc::new(vec!["tomato_can#1".to_owned()]),
         };
-        let mut truth = Arc::new(episode.truth().clone());
+        let mut truth = Arc::new(episode.truth().expect("a truth").clone());
         let mut moments = vec![moment(&episode, None, &mut truth)];
         for step in 1..=self.steps {
             let mut decision = episode.decide();
@@ -91,17 +91,19 @@ impl Script {
 }
 
 fn moment(episode: &Episode, outcome: Option<Arc<StepOutcome>>, truth: &mut Arc<TruthMap>) -> Arc<Moment> {
-    if **truth != *episode.truth() {
-        *truth = Arc::new(episode.truth().clone());
+    let now = episode.truth().expect("a truth");
+    if **truth != *now {
+        *truth = Arc::new(now.clone());
     }
     let record = episode.record();
     Arc::new(Moment {
         step: record.steps.len(),
         belief: HalfBelief::of(episode.belief()),
         seen: Arc::new(episode.seen().clone()),
-        truth: truth.clone(),
+        truth: Some(truth.clone()),
         bodies: Arc::new(episode.bodies()),
-        scores: record.steps.last().map_or(record.prior, |step| step.scores),
+        scores: record.scores_after(record.steps.len()).copied(),
+        entropy_nats: record.entropy_after(record.steps.len()),
         outcome,
     })
 }

@@ -40,6 +40,7 @@ mod tests;
 use super::command::Command;
 use super::model::{Hovered, Model};
 use nudge_core::camera::ViewId;
+use nudge_core::episode::{EpisodeRecord, NO_TRUTH};
 use re_viewer::external::egui;
 
 /// A part of the window that draws itself, and owns what it remembers from frame to frame.
@@ -132,6 +133,13 @@ fn framed(ui: &mut egui::Ui) {
 fn heading(ui: &mut egui::Ui, title: impl Into<String>, hint: &str) -> egui::Response {
     let heading = ui.label(egui::RichText::new(title).strong());
     if hint.is_empty() { heading } else { heading.on_hover_text(hint) }
+}
+
+/// Says of an episode without truth why something is not shown.
+fn untold(ui: &mut egui::Ui, record: &EpisodeRecord) {
+    if !record.has_truth() {
+        ui.weak(NO_TRUTH).on_hover_text("Nobody knows what really stands there, so nothing is scored");
+    }
 }
 
 /// The empty state of every panel without an episode.

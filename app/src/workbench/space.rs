@@ -274,8 +274,9 @@ impl Painter {
             (Some(before), ColourBy::Change) => Some(self.full((side.id, before.step), &before.belief)),
             _ => None,
         };
-        let (voxels, rgb) = Voxels { belief: &belief, truth: &side.moment.truth, catalog: &side.setup.catalog }
-            .drawn(&space.display, before.as_deref());
+        let (voxels, rgb) =
+            Voxels { belief: &belief, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
+                .drawn(&space.display, before.as_deref());
         self.log_voxels(at::BELIEF, &belief.grid, voxels, rgb);
     }
 
@@ -329,8 +330,9 @@ impl Painter {
         let key = format!("{:?} {:?}", other.key(), voxel_key(&space.display));
         let b = self.full(other.key(), &other.moment.belief);
         if self.differs(at::OTHER, key.clone()) {
-            let (voxels, rgb) = Voxels { belief: &b, truth: &other.moment.truth, catalog: &other.setup.catalog }
-                .drawn(&space.display, None);
+            let (voxels, rgb) =
+                Voxels { belief: &b, truth: other.moment.truth.as_deref(), catalog: &other.setup.catalog }
+                    .drawn(&space.display, None);
             self.log_voxels(at::OTHER, &b.grid, voxels, rgb);
         }
         let shown = space.display.truth.then_some(&other.moment.bodies);
@@ -344,8 +346,9 @@ impl Painter {
                 return self.log_voxels(at::BETWEEN, &a.grid, Vec::new(), |_| [0; 3]);
             }
             let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..space.display.clone() };
-            let (voxels, rgb) = Voxels { belief: &a, truth: &side.moment.truth, catalog: &side.setup.catalog }
-                .drawn(&changed, Some(&b));
+            let (voxels, rgb) =
+                Voxels { belief: &a, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
+                    .drawn(&changed, Some(&b));
             self.log_voxels(at::BETWEEN, &a.grid, voxels, rgb);
         }
     }

@@ -8,7 +8,7 @@
 //! of the inner loop, done row by row within the rectangle that a part covers in the image; with the few hundred
 //! parts of a shelf it beats a tree over boxes, which has to be walked anew for every pixel.
 
-use super::{Image, Intrinsics, View};
+use super::{Frame, Intrinsics, PixelClasses, Sensed, View};
 use crate::scene::{BACKGROUND, Body, Shelf};
 use crate::solid::{HalfSpace, Solid};
 use crate::world::shelf_panels;
@@ -21,26 +21,22 @@ const ROWS_PER_TASK: usize = 16;
 /// No surface in the tag buffer.
 pub(super) const NOTHING: u16 = u16::MAX;
 
-/// Depth and labels as `view` sees them, without noise.
+/// Depth and labels as `view` sees them, without noise, and which object each pixel shows.
 ///
 /// Shelf panels (board, back, walls and ceiling, [`PANEL_M`](crate::world::PANEL_M) thick) hide what is behind them and
 /// are seen as background with their depth, from inside and from outside; only the front is open. Where nothing is
 /// hit, or nearer or farther than the sensor's range, depth is 0.
-pub fn render(shelf: &Shelf, bodies: &[Body], view: &View, intrinsics: &Intrinsics) -> Image {
+pub fn render(shelf: &Shelf, bodies: &[Body], view: &View, intrinsics: &Intrinsics) -> Sensed {
     let scene = ProjectedScene::new(shelf, bodies, &view.world_from_camera, intrinsics);
     let width = intrinsics.width;
     let pixels = width * intrinsics.height;
-    let mut image = Image {
-        view: view.id,
-        size: [width, intrinsics.height],
-        depth_m: vec![0.0; pixels],
-        labels: vec![BACKGROUND.0; pixels],
-        objects: vec![u16::MAX; pixels],
-    };
+    let mut depth_m = vec![0.0; pixels];
+    let mut labels = vec![BACKGROUND.0; pixels];
+    let mut objects = vec![u16::MAX; pixels];
     let [near, far] = intrinsics.depth_range_m;
-    let tasks = image.depth_m.par_chunks_mut(width * ROWS_PER_TASK).zip(
-        image.labels.par_chunks_mut(width * ROWS_PER_TASK).zip(image.objects.par_chunks_mut(width * ROWS_PER_TASK)),
-    );
+    let tasks = depth_m
+        .par_chunks_mut(width * ROWS_PER_TASK)
+        .zip(labels.par_chunks_mut(width * ROWS_PER_TASK).zip(objects.par_chunks_mut(width * ROWS_PER_TASK)));
     tasks.enumerate().for_each(|(task, (depth, (labels, objects)))| {
         let mut row = RowBuffer::new(width);
         for (at, depth) in depth.chunks_mut(width).enumerate() {
@@ -58,7 +54,13 @@ pub fn render(shelf: &Shelf, bodies: &[Body], view: &View, intrinsics: &Intrinsi
             }
         }
     });
-    image
+    let frame = Frame {
+        world_from_camera: view.world_from_camera,
+        intrinsics: (*intrinsics).into(),
+        depth_m,
+        classes: PixelClasses::Labels(labels),
+    };
+    Sensed { frame, objects: Some(objects) }
 }
 
 /// Pixels `columns x rows`.

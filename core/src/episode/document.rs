@@ -27,9 +27,9 @@ impl EpisodeRecord {
         }
         let head: Head = serde_json::from_str(text).map_err(|error| input_error(path, &error))?;
         match head.format {
-            Some(FORMAT) => {}
+            Some(1..=FORMAT) => {}
             Some(other) => {
-                return Err(Error::input(path, "format", format!("is {other}, this version reads {FORMAT}")));
+                return Err(Error::input(path, "format", format!("is {other}, this version reads 1 to {FORMAT}")));
             }
             None => return Err(Error::input(path, "format", "is missing: not an episode")),
         }
@@ -38,10 +38,16 @@ impl EpisodeRecord {
         if let Err(fault) = record.config.planner.check() {
             return Err(Error::input(path, "planner", fault.to_string()));
         }
+        // An older document reads into the same record, and is written as that.
+        record.format = FORMAT;
         for (at, step) in record.steps.iter().enumerate() {
             if step.index != at + 1 {
                 let place = format!("steps[{at}].index");
                 return Err(Error::input(path, place, format!("is {}, expected {}", step.index, at + 1)));
+            }
+            if step.judgement.is_some() != record.has_truth() {
+                let message = "is judged and the prior is not, or the other way round";
+                return Err(Error::input(path, format!("steps[{at}]"), message));
             }
             if step.action != step.decision.action {
                 return Err(Error::input(path, format!("steps[{at}].action"), "is not the action of its decision"));
@@ -153,3 +159,7 @@ impl serde_json::ser::Formatter for Lines {
 #[cfg(test)]
 #[path = "document_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "format_tests.rs"]
+mod format_tests;

@@ -13,7 +13,7 @@ fn the_document_has_the_published_members() {
     for key in ["format", "scene", "policy", "belief", "seed", "budget", "version", "steps"] {
         assert!(document.get(key).is_some(), "{key}");
     }
-    assert_eq!(document["format"], 1);
+    assert_eq!(document["format"], 2);
     assert_eq!(document["policy"], "random-push-5-blind");
     assert_eq!(document["seed"], u64::MAX);
     let look = &document["steps"][0];
@@ -111,7 +111,7 @@ proptest! {
         let mut record = synthetic::record(2);
         record.config.planner.gamma = gamma;
         record.steps[0].decision.gains = gains.clone();
-        record.steps[1].scores.entropy_nats = entropy;
+        record.steps[1].judgement.as_mut().expect("a truth").scores.entropy_nats = entropy;
         let push = crate::arm::Push { start, direction_deg: gains[0], length_m };
         record.steps[1].action = crate::plan::Action::Push(push);
         record.steps[1].decision.action = record.steps[1].action;

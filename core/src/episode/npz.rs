@@ -1,8 +1,8 @@
 //! `beliefs/NNN.npz` and `truth/NNN.npz`: NumPy archives of a belief and of a truth.
 //!
 //! `numpy.load` reads them: a belief has `occupancy` `[W, D, H, 2]` (a_occ, a_free) and `semantics` `[W, D, 15]`, little
-//! endian float16 or float32; a truth has `occupancy` `[W, D, H]` and `labels` `[W, D]`, uint8. Archives are deflated at
-//! the fastest level and carry no time of day: the same arrays make the same bytes.
+//! endian float16 or float32; a truth has `occupancy` `[W, D, H]` and `labels` `[W, D]`, uint8, and `objects` `[W, D]`,
+//! uint16. Archives are deflated at the fastest level and carry no time of day: the same arrays make the same bytes.
 
 use crate::belief::Belief;
 use crate::grid::Grid;
@@ -59,11 +59,24 @@ pub struct StoredTruth {
     pub occupancy: Vec<u8>,
     /// Class of the tallest occupied voxel above a floor cell, else background.
     pub labels: Vec<u8>,
+    /// Object with the tallest occupied voxel above a floor cell, [`u16::MAX`] where none; not in files of programs before
+    /// format 2 of `episode.json`.
+    pub objects: Option<Vec<u16>>,
 }
 
 impl From<&TruthMap> for StoredTruth {
     fn from(truth: &TruthMap) -> Self {
-        Self { dims: truth.dims, occupancy: truth.occupancy.clone(), labels: truth.labels.clone() }
+        let (occupancy, labels) = (truth.occupancy.clone(), truth.labels.clone());
+        Self { dims: truth.dims, occupancy, labels, objects: Some(truth.objects.clone()) }
+    }
+}
+
+impl StoredTruth {
+    /// The whole map; what is asked for the objects if the file does not tell, and if nobody does there are none.
+    pub fn into_map(self, objects: impl FnOnce() -> Option<Vec<u16>>) -> TruthMap {
+        let nobody = || vec![u16::MAX; self.labels.len()];
+        let objects = self.objects.or_else(objects).unwrap_or_else(nobody);
+        TruthMap { dims: self.dims, occupancy: self.occupancy, labels: self.labels, objects }
     }
 }
 
@@ -92,6 +105,7 @@ pub fn truth_archive(truth: &TruthMap) -> Vec<u8> {
     let mut archive = Archive::new();
     archive.add("occupancy", &[w, d, h], &truth.occupancy);
     archive.add("labels", &[w, d], &truth.labels);
+    archive.add("objects", &[w, d], &truth.objects);
     archive.finish()
 }
 
@@ -115,7 +129,8 @@ pub fn read_truth(bytes: &[u8], path: &Path, grid: Grid) -> Result<StoredTruth> 
     if let Some(label) = labels.iter().find(|label| usize::from(**label) >= CLASS_COUNT) {
         return Err(Error::input(path, "array labels", format!("class {label} of {CLASS_COUNT}")));
     }
-    Ok(StoredTruth { dims: grid.dims, occupancy, labels })
+    let objects = archive.has("objects").then(|| archive.words("objects", &[w, d])).transpose()?;
+    Ok(StoredTruth { dims: grid.dims, occupancy, labels, objects })
 }
 
 /// Checks that the file is a whole archive with the named arrays, without reading them.
@@ -213,6 +228,15 @@ impl<'a> OpenArchive<'a> {
             return Err(fail("is in Fortran order".to_owned()));
         }
         guarded(|| read(file).map_err(|error| error.to_string())).map_err(fail)
+    }
+
+    fn has(&self, name: &str) -> bool {
+        let file = npyz::npz::file_name_from_array_name(name);
+        self.zip.file_names().any(|name| *name == file)
+    }
+
+    fn words(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u16>> {
+        self.array(name, shape, |file| file.into_vec::<u16>())
     }
 
     fn bytes(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u8>> {

@@ -3,7 +3,7 @@
 use super::bytes::{Reader, put_set};
 use super::{Kind, Record, Sample, VIEWS};
 use crate::arm::ArmTool;
-use crate::camera::{MapObservation, NoiseModel, ViewArray, ViewId, project};
+use crate::camera::{MapObservation, NoiseModel, View, ViewArray, ViewId, project, render};
 use crate::grid::{Grid, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
 use crate::scene::{Body, Catalog, GenerateConfig, Scene, Shelf, generate, rescale_if_room};
@@ -81,15 +81,13 @@ impl Recipe {
         let noisy = rng.random::<f32>() < self.noise_share;
         let noise = if noisy { NoiseModel::STANDARD } else { NoiseModel::OFF };
         let chosen = index::sample(&mut rng, self.views.views.len(), count);
-        Ok(chosen
-            .iter()
-            .enumerate()
-            .map(|(at, view)| {
-                let view = &self.views.views[view];
-                let image = noise.take(shelf, bodies, view, &self.views.intrinsics, seed, at as u64);
-                ViewSample { view: view.id, observation: project(&image, view, &self.views.intrinsics, shelf) }
-            })
-            .collect())
+        let sample = |(at, view): (usize, usize)| {
+            let view = &self.views.views[view];
+            let shoot = |view: &View| Ok(render(shelf, bodies, view, &self.views.intrinsics));
+            let frame = noise.apply(&noise.aim(view, seed, at as u64, shoot)?, seed, at as u64);
+            Ok(ViewSample { view: view.id, observation: project(&frame, shelf) })
+        };
+        chosen.iter().enumerate().map(sample).collect()
     }
 }
 

@@ -69,8 +69,8 @@ impl Subject<'_> {
         if causes.is_empty() && (from_to[1] - from_to[0]).abs() > CHANGED {
             causes.push(self.unseen(outcome));
         }
-        let labels = [before, after].map(|moment| moment.truth.labels.get(self.cell).copied());
-        if let [before, Some(label)] = labels
+        let label = |moment: &Moment| moment.truth.as_ref()?.labels.get(self.cell).copied();
+        if let (before, Some(label)) = (label(before), label(after))
             && before != Some(label)
         {
             causes.push(format!("what stands there became {}", self.class(label)));

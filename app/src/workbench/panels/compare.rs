@@ -149,7 +149,7 @@ fn parting(ui: &mut Ui, model: &Model, a: &Session, b: &Session, ask: &mut Vec<C
 }
 
 fn scores(ui: &mut Ui, model: &Model, a: &Session, b: &Session) {
-    let [a, b] = [a, b].map(|session| session.moment(model.cursor).scores);
+    let [a, b] = [a, b].map(|session| session.moment(model.cursor));
     heading(ui, format!("Scores after step {}", model.cursor), "Of the states that are shown");
     egui::Grid::new("compare scores").num_columns(4).striped(true).spacing([16.0, 3.0]).show(ui, |ui| {
         for title in ["", "A", "B", "A − B"] {
@@ -157,10 +157,14 @@ fn scores(ui: &mut Ui, model: &Model, a: &Session, b: &Session) {
         }
         ui.end_row();
         for series in SERIES {
-            let (a, b) = ((series.value)(&a), (series.value)(&b));
+            let (a, b) = (a.score(series), b.score(series));
+            if a.is_none() && b.is_none() {
+                continue;
+            }
+            let between = a.zip(b).map(|(a, b)| a - b);
             ui.label(RichText::new(series.title).small()).on_hover_text(series.hint);
-            for value in [a, b, a - b] {
-                ui.label(words::figure(words::significant(value, 3)));
+            for value in [a, b, between] {
+                ui.label(words::figure(value.map_or_else(String::new, |value| words::significant(value, 3))));
             }
             ui.end_row();
         }

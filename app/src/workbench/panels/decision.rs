@@ -226,7 +226,7 @@ pub(super) fn apply_push(table: table::Touched, decision: &Decision, touched: &m
 pub fn push_button(ui: &mut Ui, session: &Session, model: &Model, decision: &Decision, ask: &mut Vec<Command>) {
     let chosen = model.candidate.and_then(|at| Some((at, decision.candidates.get(at)?)));
     let title = chosen.map_or("Push this".to_owned(), |(at, _)| format!("Push this: {at}"));
-    let dropped = session.record.steps.iter().any(|step| !step.dropped.is_empty());
+    let dropped = session.record.steps.iter().any(|step| !step.dropped().is_empty());
     let missing = match chosen {
         _ if dropped => Some("An object was dropped: this episode pushes no more"),
         None => Some("Choose a push first"),

@@ -286,8 +286,8 @@ impl Here<'_> {
         let after = self.session.moments.get(self.step + 1).filter(|moment| {
             moment.outcome.as_ref().is_some_and(|outcome| outcome.record.action == Action::Push(push))
         });
-        let happened = after.map(|moment| {
-            let labels = || textures::of_rgb(&picture::paint_labels(&grid, &moment.truth.labels, catalog));
+        let happened = after.and_then(|moment| Some((moment, moment.truth.as_ref()?))).map(|(moment, truth)| {
+            let labels = || textures::of_rgb(&picture::paint_labels(&grid, &truth.labels, catalog));
             (state.textures.get(&ctx, key(Shown::After), labels), state.outlines_after.of(&moment.bodies))
         });
         let outlines = state.outlines.of(&self.session.moment(self.step).bodies);
@@ -390,9 +390,10 @@ impl Here<'_> {
     fn surprise(&self, state: &mut State, ui: &mut Ui) {
         let (before, after) = (self.session.moment(self.step - 1), self.session.moment(self.step));
         let Some(prediction) = after.outcome.as_ref().and_then(|outcome| outcome.prediction.as_ref()) else { return };
+        let Some((truth_before, truth_after)) = before.truth.as_ref().zip(after.truth.as_ref()) else { return };
         let (grid, ctx) = (self.grid, ui.ctx().clone());
         let picture = state.textures.get(&ctx, (self.session.id, self.step, Shown::Surprise), || {
-            let surprise = prediction.surprise(&grid, &before.truth.changed_cells(&after.truth));
+            let surprise = prediction.surprise(&grid, &truth_before.changed_cells(truth_after));
             textures::of_rgb(&picture::paint_surprise(&grid, &surprise))
         });
         let outlines = state.outlines_after.of(&after.bodies);

@@ -10,6 +10,7 @@ use crate::workbench::session::Moment;
 use nudge_core::arm::Push;
 use nudge_core::plan::Action;
 use nudge_core::scene::ClassId;
+use nudge_core::world::TruthMap;
 use std::sync::Arc;
 
 impl Painter {
@@ -68,7 +69,7 @@ impl Painter {
                     self.log_voxels(at::DIFFERENCE, &grid, Vec::new(), |_| [0; 3]);
                 }
                 Some((before, after)) => {
-                    let truth = &side.moment.truth;
+                    let truth = side.moment.truth.as_deref();
                     let plain = Display::default();
                     let (voxels, rgb) =
                         Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
@@ -83,12 +84,13 @@ impl Painter {
         let happened = happened(side, looked_at);
         let note = if happened.is_some() { "" } else { note(side, looked_at) };
         if self.differs(at::HAPPENED, format!("{:?} {:?} {note}", side.key(), happened.map(|moment| moment.step))) {
-            let truth = happened.map_or(&side.moment.truth, |happened| &happened.truth);
-            let inside: Vec<bool> = truth.occupancy.iter().map(|o| *o == 1).collect();
-            let voxels = if happened.is_some() { surface(&grid, &inside) } else { Vec::new() };
+            let truth = happened.and_then(|happened| happened.truth.as_deref());
+            let inside = |truth: &TruthMap| truth.occupancy.iter().map(|o| *o == 1).collect::<Vec<bool>>();
+            let voxels = truth.map_or_else(Vec::new, |truth| surface(&grid, &inside(truth)));
             let catalog = &side.setup.catalog;
             self.log_voxels(at::HAPPENED, &grid, voxels, |index| {
-                colors::of_class(catalog, ClassId(truth.labels[index / grid.dims[2]]))
+                let label = truth.and_then(|truth| truth.labels.get(index / grid.dims[2]));
+                label.map_or(colors::UNKNOWN_RGB, |label| colors::of_class(catalog, ClassId(*label)))
             });
             let [_, depth, height] = side.shelf.size;
             self.log(at::HAPPENED_NOTE, &shapes::words([0.0, 0.5 * depth, 0.5 * height], note));

@@ -98,7 +98,7 @@ fn change() -> impl Strategy<Value = Change> {
 
 /// An input: which of the sound files, and what is changed in it.
 pub fn input() -> impl Strategy<Value = (Index, Vec<Change>)> {
-    (any::<Index>(), prop::collection::vec(change(), 1..6))
+    (any::<Index>(), prop::collection::vec(change(), 1..4))
 }
 
 /// The file after all changes; `words` are those of its format.

@@ -123,22 +123,22 @@ fn obj_files() {
     let words =
         ["nan", "inf", "f 1 2 3\n", "f -1 -2 -3\n", "v 0 0 0\n", "\\\n", "#", "o a\n", "g b\n", "usemtl\n", "/"];
     let sound = vec![obj(&cuboid()), obj(&angle())];
-    run(Target { name: "OBJ", sound, words: &words, inputs: 120 }, "obj", <[u8]>::to_vec);
+    run(Target { name: "OBJ", sound, words: &words, inputs: 60 }, "obj", <[u8]>::to_vec);
 }
 
 #[test]
 fn stl_files() {
     let words = ["nan", "inf", "solid a\n", "endsolid\n", "facet ", "endfacet\n", "vertex 0 0 0\n", "\u{feff}"];
     let sound = vec![stl_text(&cuboid()), stl_text(&angle())];
-    run(Target { name: "STL text", sound, words: &words, inputs: 100 }, "stl", <[u8]>::to_vec);
+    run(Target { name: "STL text", sound, words: &words, inputs: 50 }, "stl", <[u8]>::to_vec);
     let sound = vec![stl_binary(&cuboid()), stl_binary(&angle())];
-    run(Target { name: "STL binary", sound, words: &[], inputs: 100 }, "stl", <[u8]>::to_vec);
+    run(Target { name: "STL binary", sound, words: &[], inputs: 50 }, "stl", <[u8]>::to_vec);
 }
 
 #[test]
 fn glb_files() {
     let sound = [cuboid(), angle()].map(|shape| glb(&document(&shape), &numbers(&shape))).to_vec();
-    run(Target { name: "GLB", sound, words: &["JSON", "BIN\0", "glTF"], inputs: 100 }, "glb", <[u8]>::to_vec);
+    run(Target { name: "GLB", sound, words: &["JSON", "BIN\0", "glTF"], inputs: 50 }, "glb", <[u8]>::to_vec);
     let words = [
         "\"byteStride\":12,",
         "\"normalized\":true,",
@@ -160,6 +160,6 @@ fn glb_files() {
         "{}",
     ];
     let shape = cuboid();
-    let target = Target { name: "GLB by its JSON", sound: vec![document(&shape)], words: &words, inputs: 300 };
+    let target = Target { name: "GLB by its JSON", sound: vec![document(&shape)], words: &words, inputs: 100 };
     run(target, "glb", |json| glb(json, &numbers(&shape)));
 }

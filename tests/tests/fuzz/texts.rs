@@ -46,7 +46,7 @@ fn scenes() {
 #[test]
 fn scenes_in_the_world() {
     let catalog = Catalog::standard();
-    let target = Target { name: "scene in the world", sound: shipped_scenes(), words: &SCENE_WORDS, inputs: 20 };
+    let target = Target { name: "scene in the world", sound: shipped_scenes(), words: &SCENE_WORDS, inputs: 8 };
     target.run(|file| {
         let Ok((scene, _)) = Scene::parse(&as_text(file), Path::new("scene.toml"), &catalog) else { return false };
         let bodies = scene.bodies(&catalog).expect("a checked scene");

@@ -81,6 +81,12 @@ impl Rect {
         meet(&self.columns, &other.columns) && meet(&self.rows, &other.rows)
     }
 
+    /// Number of pixels that two rectangles have in common.
+    pub(super) fn pixels_shared(&self, other: &Self) -> usize {
+        let shared = |a: &Range<usize>, b: &Range<usize>| a.end.min(b.end).saturating_sub(a.start.max(b.start));
+        shared(&self.columns, &other.columns) * shared(&self.rows, &other.rows)
+    }
+
     pub(super) fn union(self, other: &Self) -> Self {
         let hull = |a: Range<usize>, b: &Range<usize>| {
             if a.is_empty() {
@@ -113,6 +119,8 @@ pub(super) struct ProjectedPart {
     outside: Vec<[f32; 3]>,
     inside: Vec<[f32; 3]>,
     pub(super) rect: Rect,
+    /// The largest inverse depth of its corners, 1 / m; infinite if one is beside or behind the camera.
+    pub(super) nearest: f32,
     /// Index of the body, [`NOTHING`] for the shelf.
     pub(super) tag: u16,
 }
@@ -197,25 +205,8 @@ pub(super) fn scan<'a>(
             continue;
         }
         let first = start as f32 + 0.5 - center[0];
-        let enter = &mut buffer.enter[..end - start];
-        enter.fill(f32::INFINITY);
-        for [a, b, c] in &part.outside {
-            let base = b * v + c;
-            for (i, enter) in enter.iter_mut().enumerate() {
-                let w = a * (first + i as u32 as f32) + base;
-                *enter = if w < *enter { w } else { *enter };
-            }
-        }
-        let leave = &mut buffer.leave[..end - start];
-        // Hits must lie before the camera.
-        leave.fill(f32::MIN_POSITIVE);
-        for [a, b, c] in &part.inside {
-            let base = b * v + c;
-            for (i, leave) in leave.iter_mut().enumerate() {
-                let w = a * (first + i as u32 as f32) + base;
-                *leave = if w > *leave { w } else { *leave };
-            }
-        }
+        let (enter, leave) = (&mut buffer.enter[..end - start], &mut buffer.leave[..end - start]);
+        part.cross([first, v], enter, leave);
         let (best, tags) = (&mut buffer.inverse_depth[start..end], &mut buffer.tag[start..end]);
         for (((enter, leave), best), tag) in enter.iter().zip(leave.iter()).zip(best).zip(tags) {
             let hit = *enter >= *leave && *enter > *best;
@@ -225,7 +216,53 @@ pub(super) fn scan<'a>(
     }
 }
 
+/// Takes from what the last [`scan`] of a row has found of one body the pixels that another part hides; `is_first` says whether
+/// that part counts where both are hit at the same depth.
+pub(super) fn hide(
+    part: &ProjectedPart,
+    is_first: bool,
+    center: [f32; 2],
+    row: usize,
+    columns: &Range<usize>,
+    buffer: &mut RowBuffer,
+) {
+    let start = part.rect.columns.start.max(columns.start);
+    let end = part.rect.columns.end.min(columns.end);
+    if start >= end || !part.rect.rows.contains(&row) {
+        return;
+    }
+    let (enter, leave) = (&mut buffer.enter[..end - start], &mut buffer.leave[..end - start]);
+    part.cross([start as f32 + 0.5 - center[0], row as f32 + 0.5 - center[1]], enter, leave);
+    let (depths, tags) = (&buffer.inverse_depth[start..end], &mut buffer.tag[start..end]);
+    for (((enter, leave), depth), tag) in enter.iter().zip(leave.iter()).zip(depths).zip(tags) {
+        let hides = *enter >= *leave && (*enter > *depth || is_first && *enter == *depth);
+        *tag = if hides { NOTHING } else { *tag };
+    }
+}
+
 impl ProjectedPart {
+    /// Where the rays of a row from the pixel `[u, v]` (from the image's centre) on enter the part, and where they leave it, as
+    /// inverse depths: they hit it where the former is no smaller.
+    fn cross(&self, [first, v]: [f32; 2], enter: &mut [f32], leave: &mut [f32]) {
+        enter.fill(f32::INFINITY);
+        for [a, b, c] in &self.outside {
+            let base = b * v + c;
+            for (i, enter) in enter.iter_mut().enumerate() {
+                let w = a * (first + i as u32 as f32) + base;
+                *enter = if w < *enter { w } else { *enter };
+            }
+        }
+        // Hits must lie before the camera.
+        leave.fill(f32::MIN_POSITIVE);
+        for [a, b, c] in &self.inside {
+            let base = b * v + c;
+            for (i, leave) in leave.iter_mut().enumerate() {
+                let w = a * (first + i as u32 as f32) + base;
+                *leave = if w > *leave { w } else { *leave };
+            }
+        }
+    }
+
     /// Whether this part surely hides the hull of some corners, each given by column and row from the image's centre and by its
     /// inverse depth: a convex solid stays convex in these coordinates, where every face plane is linear, so the corners tell for
     /// all of the hull. Planes that the camera is nearly in are not trusted.
@@ -258,8 +295,8 @@ impl ProjectedPart {
         intrinsics: &Intrinsics,
         tag: u16,
     ) -> Self {
-        let mut part =
-            Self { outside: vec![], inside: vec![], rect: image_rect(vertices, camera_from_part, intrinsics), tag };
+        let (rect, nearest) = image_rect(vertices, camera_from_part, intrinsics);
+        let mut part = Self { outside: vec![], inside: vec![], rect, nearest, tag };
         let camera = camera_from_part.inverse_transform_point(&Point::origin()).coords;
         for face in faces {
             let normal = camera_from_part.rotation * face.normal;
@@ -275,11 +312,12 @@ impl ProjectedPart {
     }
 }
 
-/// The pixels whose rays can hit the hull of `vertices`.
-pub(super) fn image_rect(vertices: &[Point], camera_from_part: &Pose, intrinsics: &Intrinsics) -> Rect {
+/// The pixels whose rays can hit the hull of `vertices`, and the largest inverse depth of these.
+fn image_rect(vertices: &[Point], camera_from_part: &Pose, intrinsics: &Intrinsics) -> (Rect, f32) {
     let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
     let center = intrinsics.principal_px();
     let (mut behind, mut before) = (false, false);
+    let mut nearest = 0.0_f32;
     for vertex in vertices {
         let seen = camera_from_part * vertex;
         if seen.z < 1e-3 {
@@ -287,6 +325,7 @@ pub(super) fn image_rect(vertices: &[Point], camera_from_part: &Pose, intrinsics
             continue;
         }
         before = true;
+        nearest = nearest.max(1.0 / seen.z);
         for axis in 0..2 {
             let pixel = intrinsics.focal_px * seen[axis] / seen.z + center[axis];
             low[axis] = low[axis].min(pixel);
@@ -302,5 +341,5 @@ pub(super) fn image_rect(vertices: &[Point], camera_from_part: &Pose, intrinsics
         let clip = |pixel: f32| pixel.clamp(0.0, size[axis] as f32) as usize;
         clip((low[axis] - 1.0).floor())..clip((high[axis] + 1.0).ceil())
     };
-    Rect { columns: range(0), rows: range(1) }
+    (Rect { columns: range(0), rows: range(1) }, if behind { f32::INFINITY } else { nearest })
 }

@@ -8,17 +8,20 @@
 //!   hidden and stands still is looked for only in views where something that has moved was drawn over its outline.
 //! * What one convex part alone hides is not drawn ([`ProjectedPart::covers`]).
 
-use super::render::{ProjectedPart, ProjectedScene, Rect, RowBuffer, project_body, scan};
+use super::render::{ProjectedPart, ProjectedScene, Rect, RowBuffer, hide, project_body, scan};
 use super::visibility::UNSEEN_PX;
 use super::{View, ViewArray};
 use crate::scene::{Body, ObjectId, Shelf};
 use crate::solid::{Bounds, ConvexPart};
 use crate::{Point, Pose, Vector};
 use rayon::prelude::*;
+use std::cmp::Reverse;
 
 /// So many views are passed over between two that are tried one after the other: neighbours see the same things.
 const STRIDE: usize = 37;
 
+/// What is not even so many times as near as a body's farthest corner stands behind it: far more than rounding.
+const BEHIND: f32 = 1.001;
 /// How much larger than its part a box is to every side, metres.
 const GROWN_M: f32 = 0.001;
 /// Nearer to the camera's plane than this, a corner has no place in the image, metres.
@@ -148,34 +151,48 @@ impl<'a> HiddenWatch<'a> {
         let parts = || scene.parts.iter().filter(stays).chain(now);
         let outline = parts().filter(|part| usize::from(part.tag) == body).map(|part| part.rect.clone());
         let Some(outline) = outline.reduce(|a, b| a.union(&b)) else { return false };
-        let mut near: Vec<&ProjectedPart> = parts().filter(|part| part.rect.meets(&outline)).collect();
-        if self.is_covered([body, view], world_from_body, &near) {
+        let camera_from_body = self.views.views[view].world_from_camera.inverse() * world_from_body;
+        let boxes: Option<Vec<[[f32; 3]; 8]>> = (self.boxes[body].iter())
+            .map(|bounds| corners(bounds, &camera_from_body, self.views.intrinsics.focal_px))
+            .collect();
+        let farthest = boxes.iter().flatten().flatten().map(|corner| corner[2]).reduce(f32::min).unwrap_or(0.0);
+        let may_hide = |part: &&ProjectedPart| {
+            usize::from(part.tag) != body && part.nearest * BEHIND >= farthest && part.rect.meets(&outline)
+        };
+        let mut others: Vec<&ProjectedPart> = parts().filter(may_hide).collect();
+        let is_covered = |corners: &[[f32; 3]; 8]| others.iter().any(|part| part.covers(corners));
+        if boxes.is_some_and(|boxes| boxes.iter().all(is_covered)) {
             return false;
         }
-        // As they would be projected together: the shelf, then the bodies in their order.
-        near.sort_by_key(|part| part.tag.wrapping_add(1));
+        // What hides most first, so that little is left to ask of the others.
+        others.sort_by_key(|part| Reverse(part.rect.pixels_shared(&outline)));
+        let own: Vec<&ProjectedPart> = parts().filter(|part| usize::from(part.tag) == body).collect();
         let [least, most] = self.views.intrinsics.depth_range_m;
         let in_range = (1.0 / most)..=(1.0 / least);
         let mut count = 0;
         for row in outline.rows {
-            scan(near.iter().copied(), scene.center(), row, outline.columns.clone(), buffer);
-            let hits = buffer.tag[outline.columns.clone()].iter().zip(&buffer.inverse_depth[outline.columns.clone()]);
-            count += hits.filter(|(tag, depth)| usize::from(**tag) == body && in_range.contains(depth)).count();
+            let columns = outline.columns.clone();
+            scan(own.iter().copied(), scene.center(), row, columns.clone(), buffer);
+            let shown = |buffer: &RowBuffer| {
+                let hits = buffer.tag[columns.clone()].iter().zip(&buffer.inverse_depth[columns.clone()]);
+                hits.filter(|(tag, depth)| usize::from(**tag) == body && in_range.contains(depth)).count()
+            };
+            let mut left = shown(buffer);
+            for other in &others {
+                if left == 0 {
+                    break;
+                }
+                // Of two that are hit at the same depth the shelf counts first, then the bodies in their order.
+                let is_first = usize::from(other.tag.wrapping_add(1)) < body + 1;
+                hide(other, is_first, scene.center(), row, &columns, buffer);
+                left = shown(buffer);
+            }
+            count += left;
             if count >= UNSEEN_PX {
                 return true;
             }
         }
         false
-    }
-
-    /// Whether each part of a body is hidden by one part of another alone.
-    fn is_covered(&self, [body, view]: [usize; 2], world_from_body: &Pose, near: &[&ProjectedPart]) -> bool {
-        let camera_from_body = self.views.views[view].world_from_camera.inverse() * world_from_body;
-        let others = || near.iter().filter(|part| usize::from(part.tag) != body);
-        self.boxes[body].iter().all(|bounds| {
-            corners(bounds, &camera_from_body, self.views.intrinsics.focal_px)
-                .is_some_and(|corners| others().any(|part| part.covers(&corners)))
-        })
     }
 }
 

@@ -17,6 +17,9 @@ use std::ops::Range;
 /// Nearer to the camera's plane than this, a corner of a box has no place in the image, metres.
 const BEFORE_CAMERA_M: f32 = 1e-3;
 
+/// Every so many-th view counts for what is shown of objects: neighbours see the same things.
+const SHOWN_EVERY: usize = 4;
+
 /// What all views of an array together reach of a true map.
 pub struct TrueReach {
     /// Without skip levels, so that a ray visits every voxel on its way.
@@ -27,7 +30,7 @@ pub struct TrueReach {
     views: Vec<ViewRays>,
     /// Per voxel of the padded grid, whether a ray reaches it.
     reached: Vec<bool>,
-    /// Per voxel of the padded grid, how many rays it stops.
+    /// Per voxel of the padded grid, how many rays of every [`SHOWN_EVERY`]-th view it stops.
     stopped: Vec<u32>,
 }
 
@@ -79,7 +82,7 @@ impl TrueReach {
         };
         let (views, reached) = array.views.par_iter().fold(begin, walk).reduce(begin, join);
         let mut stopped = vec![0; field.codes.len()];
-        views.iter().flat_map(|view| &view.stops).for_each(|stop| stopped[*stop as usize] += 1);
+        views.iter().step_by(SHOWN_EVERY).flat_map(|view| &view.stops).for_each(|stop| stopped[*stop as usize] += 1);
         Self { field, array: array.clone(), density, views, reached, stopped }
     }
 
@@ -88,7 +91,8 @@ impl TrueReach {
         inside(&self.field, |index| self.reached[index])
     }
 
-    /// How many voxels of each object a view reaches; `owners` says per voxel whose it is, as [`TruthMap::owners`].
+    /// How many voxels of each object a view reaches, of every fourth view of the array; `owners` says per voxel whose it is,
+    /// as [`TruthMap::owners`].
     pub fn shown(&self, owners: &[u16], objects: usize) -> Vec<u32> {
         shown(&self.field, &self.stopped, owners, objects)
     }
@@ -100,8 +104,8 @@ impl TrueReach {
     }
 
     /// What views reach once the bodies stand as in `after`, a truth of the same grid; everything that is filled there and
-    /// was not before is inside of one of the boxes `filled`. Only rays are walked whose stop has become free or that may
-    /// meet a box: all others end where they ended.
+    /// was not before is inside of one of the boxes `filled`. Only rays are walked whose stop has become free or, of views that
+    /// count for what is shown, that may meet a box: all others end where they ended.
     pub fn after(&self, after: &TruthMap, filled: &[Bounds]) -> ReachAfter {
         let field = GainField::of_truth(self.field.grid(), after);
         let mut freed = vec![0_u64; field.codes.len().div_ceil(64)];
@@ -112,8 +116,10 @@ impl TrueReach {
         }
         let mut reached = self.reached.clone();
         let mut stopped = self.stopped.clone();
-        for (view, seen) in self.array.views.iter().zip(&self.views) {
-            let across: Vec<[Range<u16>; 2]> = filled.iter().map(|bounds| self.rays_through(view, bounds)).collect();
+        for (number, (view, seen)) in self.array.views.iter().zip(&self.views).enumerate() {
+            let counts = number % SHOWN_EVERY == 0;
+            let boxes = filled.iter().filter(|_| counts);
+            let across: Vec<[Range<u16>; 2]> = boxes.map(|bounds| self.rays_through(view, bounds)).collect();
             let may_meet = |[column, row]: [u16; 2]| {
                 across.iter().any(|[columns, rows]| columns.contains(&column) && rows.contains(&row))
             };
@@ -122,8 +128,10 @@ impl TrueReach {
                 if freed[stop / 64] >> (stop % 64) & 1 == 1 || may_meet(*place) {
                     let mut tally = Reached { reached: &mut reached, stop: 0 };
                     seen.rays[at].walk(&field, &mut tally);
-                    stopped[stop] -= 1;
-                    stopped[tally.stop] += 1;
+                    if counts {
+                        stopped[stop] -= 1;
+                        stopped[tally.stop] += 1;
+                    }
                 }
             }
         }

@@ -47,7 +47,8 @@ pub struct PushTruth {
     pub dropped: Vec<ObjectId>,
     /// Objects that stood and no longer do, dropped ones left out.
     pub toppled: Vec<ObjectId>,
-    /// How many voxels of each object a view reaches after it, in the scene's order; 0 of dropped ones.
+    /// How many voxels of each object a view reaches after it, of every fourth view of the array, in the scene's order; 0 of
+    /// dropped ones.
     pub shown: Vec<u32>,
 }
 

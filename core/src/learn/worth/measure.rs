@@ -7,10 +7,10 @@ use super::rollout::Rollout;
 use super::state::{BeliefMap, FloorFacts, Followed, ObjectOutcome, ObjectState, Promise, WorthPush, WorthState};
 use crate::arm::PushMotion;
 use crate::belief::{Belief, dirichlet_entropy, dirichlet_vacuity};
-use crate::gain::TrueReach;
+use crate::gain::{RayDensity, TrueReach};
 use crate::grid::VoxelSet;
 use crate::learn::maps::occupied;
-use crate::push::{Counterfactual, PushTruth, REACH_DENSITY};
+use crate::push::{Counterfactual, PushTruth};
 use crate::rng::stream;
 use crate::scene::{Body, CLASS_COUNT};
 use crate::world::TruthMap;
@@ -69,7 +69,7 @@ fn map(rollout: &Rollout<'_>) -> BeliefMap {
         labels: vec![0; grid.cell_count()],
         objects: vec![u16::MAX; grid.cell_count()],
     };
-    let reached: VoxelSet = TrueReach::new(&grid, &likeliest, &rollout.recipe.base.views, REACH_DENSITY).reached();
+    let reached: VoxelSet = TrueReach::new(&grid, &likeliest, &rollout.recipe.base.views, RayDensity::COARSE).reached();
     BeliefMap {
         occupancy,
         deviation,

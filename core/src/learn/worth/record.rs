@@ -20,7 +20,7 @@ pub const LAYOUT: [&str; 10] = [
      reached u1[x y z] (voxels of 8 that some view reaches through the likeliest map)",
     "class u1[X Y]; certainty u1[X Y] (255ths); entropy u1[X Y] (255ths of ln 15); vacuity u1[X Y] (255ths)",
     "truth bit[X Y Z] (words of 64); labels u1[X Y]",
-    "object_count u2; per object: id u2, class u1, hidden u1, shown u4 (voxels that a view reaches), pose f4[7] (x y z m, i j k w)",
+    "object_count u2; per object: id u2, class u1, hidden u1, shown u4 (voxels that every fourth view reaches), pose f4[7] (x y z m, i j k w)",
     "push_count u2; then per push the following",
     "start f4[3] (m); direction f4 (degrees); length f4 (m); contact u2[3] (voxel); sampler u1 (0 frontier, 1 hidden); \
      motion f4 (s); swept bit[x y z]",

@@ -4,16 +4,17 @@ use super::considered::Considered;
 use super::{STATES_PER_EPISODE, WorthRecipe};
 use crate::Result;
 use crate::belief::{Belief, Sightings, SweptPush, look};
-use crate::camera::{NoiseModel, View, ViewId, project, render};
+use crate::camera::{HiddenWatch, NoiseModel, View, ViewId, project, render};
 use crate::gain::{Openings, RayDensity, ViewPair};
 use crate::learn::Recipe;
 use crate::plan::{Counted, Gain, coarse, disturbance};
 use crate::push::{Candidate, PushSampler, sample};
-use crate::rng::stream;
+use crate::rng::{derived_seed, stream};
 use crate::scene::{Family, GenerateConfig};
 use crate::world::World;
 use rand::Rng;
 use std::cell::OnceCell;
+use std::ops::RangeInclusive;
 
 /// One of so many pushes is drawn before what is hidden, the others from the frontier.
 const ONE_HIDDEN_IN: usize = 4;
@@ -21,6 +22,10 @@ const ONE_HIDDEN_IN: usize = 4;
 const PUSH_CHANCE: f32 = 0.6;
 /// Looks before a state at most.
 const LOOKS: usize = 3;
+/// Hidden objects that a shelf is drawn to have at least: a number from this range.
+const HIDDEN: RangeInclusive<usize> = 1..=6;
+/// Shelves that are drawn at most for one that hides so many.
+const DRAWS: u64 = 16;
 
 /// What happens before a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +54,24 @@ pub(super) fn legs(seed: u64) -> [Leg; STATES_PER_EPISODE] {
         let looks = rng.random_range(1..=LOOKS);
         Leg { push: (leg > 0 && pushes < PUSH_CHANCE).then_some(push), looks }
     })
+}
+
+/// A settled shelf that hides so many objects, or of those that are drawn the one that hides most: most shelves hide too little for
+/// a push to show anything.
+fn world_that_hides(recipe: &Recipe, wanted: usize, seed: u64) -> Result<World> {
+    let mut best: Option<(usize, u64)> = None;
+    for draw in 0..DRAWS {
+        let seed = derived_seed(seed, "worth shelf", draw);
+        let scene = recipe.scene(seed)?;
+        let hidden = HiddenWatch::new(&scene.shelf, &scene.bodies(&recipe.catalog)?, &recipe.views).hidden().len();
+        if best.is_none_or(|(most, _)| hidden > most) {
+            best = Some((hidden, seed));
+        }
+        if hidden >= wanted {
+            break;
+        }
+    }
+    recipe.world(best.map_or(seed, |(_, seed)| seed))
 }
 
 /// An episode as far as it has come. A clone is a branch.
@@ -86,7 +109,7 @@ impl<'a> Rollout<'a> {
         let noisy = rng.random::<f32>() < base.noise_share;
         let random_looks = [0.0, 0.0, 0.5, 1.0][rng.random_range(0..4_usize)];
         let scenes = GenerateConfig { fill: family.fill(), rho: family.rho(), family, ..base.scenes.clone() };
-        let world = Recipe { scenes, ..base.clone() }.world(seed)?;
+        let world = world_that_hides(&Recipe { scenes, ..base.clone() }, rng.random_range(HIDDEN), seed)?;
         let grid = base.grid();
         let hands = base.views.hand_poses(&base.arm);
         Ok(Self {

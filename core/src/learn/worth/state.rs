@@ -61,7 +61,8 @@ pub struct BeliefMap {
     pub deviation: Vec<u8>,
     /// How many of the voxels looks have seen, of 8.
     pub seen: Vec<u8>,
-    /// How many of them some view reaches through the likeliest map, of 8; what none reaches only pushes can show.
+    /// How many of them some view reaches through the likeliest map, of 8, by one ray in 16 pixels along both axes; what none
+    /// reaches only pushes can show.
     pub reached: Vec<u8>,
 }
 
@@ -87,7 +88,7 @@ pub struct ObjectState {
     pub class: u8,
     /// Whether no view shows it.
     pub hidden: bool,
-    /// How many of its voxels a view reaches.
+    /// How many of its voxels a view reaches, of every fourth view.
     pub shown: u32,
     /// Its pose: x, y, z in metres, then the rotation's quaternion i, j, k, w.
     pub pose: [f32; 7],
@@ -146,7 +147,7 @@ pub struct ObjectOutcome {
     pub hidden: bool,
     /// Whether it left the board.
     pub dropped: bool,
-    /// How many of its voxels a view reaches afterwards.
+    /// How many of its voxels a view reaches afterwards, of every fourth view.
     pub shown: u32,
 }
 

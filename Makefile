@@ -12,11 +12,13 @@ DATA := $(CURDIR)/out/data
 DEMO := scenes/high/can-phalanx.toml
 
 .PHONY: help setup graphics python networks headless demo workbench workbench-build train train-push \
-	test test-core test-headless test-window regress bench bench-window lint lint-classical once install uninstall
+	test test-core test-headless test-window fuzz kills faults regress bench bench-window lint lint-classical how-to-add once install uninstall
 help:
 	@echo 'make demo             map a crowded shelf with and without pushes: prints the table, writes out/demo/'
 	@echo 'make workbench        build and open the window (make workbench-build: build only)'
 	@echo 'make test             all tests (make test-headless: those that need no window)'
+	@echo 'make fuzz             a million changed files for everything that reads one (NUDGE_FUZZ=N: how many)'
+	@echo 'make kills            200 kills of runs that are gone on with; make faults: every file operation refused in turn'
 	@echo 'make regress          the scores of a small fixed bench against golden ones'
 	@echo 'make bench            the speed of the parts that matter, beside their targets'
 	@echo 'make bench-window     what the window costs: frames, latency, memory'
@@ -90,6 +92,18 @@ test-headless: headless python
 test-window: workbench-build python
 	NUDGE_BIN=$(NUDGE) NUDGE_VENV=$(VENV) $(CARGO) test --release --locked --no-fail-fast --workspace --exclude nudge-core $(WINDOW)
 
+# How many inputs each reader is given, and after how many seconds of one reader the next has its turn.
+fuzz: export NUDGE_FUZZ ?= 1000000
+fuzz: export NUDGE_FUZZ_SECONDS ?= 3600
+fuzz: headless
+	NUDGE_BIN=$(NUDGE) $(CARGO) test --release --locked --no-fail-fast --workspace --test fuzz -- --nocapture --test-threads 1
+
+kills: headless
+	NUDGE=$(NUDGE) scripts/kills.sh
+
+faults: headless
+	NUDGE=$(NUDGE) scripts/faults.sh
+
 regress: headless
 	$(NUDGE) regress
 
@@ -109,6 +123,10 @@ lint: graphics networks
 # The build without libtorch: it compiles, without warnings.
 lint-classical: setup
 	$(LINT) --no-default-features
+
+# Adds one of each to a copy of the sources, in the files that ARCHITECTURE.md lists, and compiles it.
+how-to-add: graphics networks
+	scripts/how-to-add.sh
 
 once: networks
 	scripts/compiled-once.sh

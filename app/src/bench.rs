@@ -14,9 +14,9 @@ mod store;
 mod summary;
 mod work;
 
-pub use makers::{AlsoMadeBy, Mixing};
+pub use makers::Mixing;
 pub use merge::merge;
-pub use plan::{BrokenScene, EpisodeId, FORMAT, Plan, PolicyPlan, ScenePlan, SetPlan, load_sets};
+pub use plan::{AlsoMadeBy, BrokenScene, EpisodeId, FORMAT, Plan, PolicyPlan, ScenePlan, SetPlan, load_sets};
 pub use result::{EpisodeResult, EpisodeSeconds, StepResult, VerdictCounts};
 pub use store::BenchDir;
 pub use summary::{SummaryRow, summarise};

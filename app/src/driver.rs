@@ -2,7 +2,7 @@
 //!
 //! A [`Driver`] keeps three things in step: the [`Episode`] itself, the [`EpisodeDir`] that it is written to, and the
 //! recording in it. One call of [`Driver::act`] moves all three by one action; a run that is killed between or within
-//! calls leaves a directory that [`Driver::resume`] goes on with.
+//! calls leaves a directory that [`Driver::go_on`] goes on with.
 
 use crate::figure::{Moment, Summary, summary};
 use crate::made_by;
@@ -12,7 +12,8 @@ use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical};
 use nudge_core::camera::{ViewArray, hidden_objects};
 use nudge_core::cnabu;
 use nudge_core::episode::{
-    Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Observer, Overwrite, StepOutcome, resume,
+    Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Observer, Overwrite, StepOutcome, resume,
+    resume_from_checkpoint,
 };
 use nudge_core::files::{remove_if_there, temporary_of};
 use nudge_core::plan::{Decision, PolicyKind};
@@ -41,7 +42,7 @@ struct Story {
     /// The bodies before the first action.
     start: Vec<Body>,
     /// Belief and truth after the first action and after half of the budget.
-    moments: Vec<(usize, Belief, TruthMap)>,
+    moments: Vec<(usize, Belief, Option<TruthMap>)>,
 }
 
 impl Story {
@@ -49,11 +50,30 @@ impl Story {
         Self { start: episode.bodies(), moments: Vec::new() }
     }
 
+    /// The same of an episode that goes on from a checkpoint: what it went through is read from its files.
+    fn of_files(directory: &EpisodeDir, episode: &Episode) -> Result<Self> {
+        let record = episode.record();
+        let mut story = Self { start: Vec::new(), moments: Vec::new() };
+        if let Some(shelf) = episode.simulated() {
+            story.start = shelf.bodies_at_start();
+        }
+        for step in (1..=record.steps.len()).filter(|step| Self::shows(record, *step)) {
+            let truth = record.has_truth().then(|| directory.read_truth(step)).transpose()?;
+            story.moments.push((step, directory.read_belief(step)?, truth.map(|truth| truth.into_map(|| None))));
+        }
+        Ok(story)
+    }
+
+    /// Whether the figure shows the state after a step, other than the last.
+    fn shows(record: &EpisodeRecord, step: usize) -> bool {
+        step == 1 || step == record.config.budget.div_ceil(2)
+    }
+
     /// Takes note of a step if it is one that the figure shows.
     fn note(&mut self, episode: &Episode) {
-        let (step, half) = (episode.record().steps.len(), episode.record().config.budget.div_ceil(2));
-        if step == 1 || step == half {
-            self.moments.push((step, episode.belief().clone(), episode.truth().clone()));
+        let step = episode.record().steps.len();
+        if Self::shows(episode.record(), step) {
+            self.moments.push((step, episode.belief().clone(), episode.truth().cloned()));
         }
     }
 
@@ -64,7 +84,7 @@ impl Story {
             .moments
             .iter()
             .filter(|(step, ..)| *step != last)
-            .map(|(step, belief, truth)| Moment { step: *step, belief, truth })
+            .map(|(step, belief, truth)| Moment { step: *step, belief, truth: truth.as_ref() })
             .collect();
         moments.push(Moment { step: last, belief: episode.belief(), truth: episode.truth() });
         summary(&Summary {
@@ -90,13 +110,51 @@ impl Driver {
         out: &Path,
         overwrite: Overwrite,
     ) -> Result<Self> {
+        Self::start_filing(scene, catalog, config, update, out, overwrite, Frames::Filed)
+    }
+
+    /// The same, with or without what belief updates are told.
+    pub fn start_filing(
+        scene: Scene,
+        catalog: Arc<Catalog>,
+        config: EpisodeConfig,
+        update: Arc<dyn BeliefUpdate>,
+        out: &Path,
+        overwrite: Overwrite,
+        frames: Frames,
+    ) -> Result<Self> {
         let mut episode = Episode::new(scene, catalog, config, update)?;
         episode.built_from(made_by::build());
-        let mut directory = EpisodeDir::create(out, overwrite)?;
+        let mut directory = EpisodeDir::create(out, overwrite)?.with_frames(frames);
         let mut recorder = Recorder::create(&out.join(RECORDING), &episode)?;
         recorder.prior(&episode)?;
         directory.write(&mut episode)?;
         Ok(Self { story: Story::new(&episode), episode, directory, recorder })
+    }
+
+    /// Goes on with the episode in `out` from its checkpoint, without repeating anything; where it has none, or its recording
+    /// does not hold all of its steps, as [`Driver::resume`] does.
+    ///
+    /// # Errors
+    /// What [`resume_from_checkpoint`] and [`resume`] refuse.
+    pub fn go_on(
+        out: &Path,
+        catalog: Arc<Catalog>,
+        update: Arc<dyn BeliefUpdate>,
+        watch: Observer<'_>,
+    ) -> Result<Self> {
+        if let Some((directory, mut episode)) = resume_from_checkpoint(out, catalog.clone(), update.clone())? {
+            let recording = out.join(RECORDING);
+            let anew = temporary_of(&recording);
+            if let Some(mut recorder) = Recorder::go_on(&anew, &recording, &episode)? {
+                recorder.move_to(&recording)?;
+                episode.built_from(made_by::build());
+                let story = Story::of_files(&directory, &episode)?;
+                return Ok(Self { episode, directory, recorder, story });
+            }
+            remove_if_there(&anew)?;
+        }
+        Self::resume(out, catalog, update, watch)
     }
 
     /// Goes on with the episode in `out`: repeats and verifies its log, and records it anew on the way.
@@ -182,6 +240,9 @@ impl Driver {
         let Self { episode, directory, recorder, story } = self;
         recorder.finish()?;
         picture::save(&story.figure(&episode, beside)?, &directory.path().join(SUMMARY))?;
+        if episode.is_finished() {
+            directory.finish()?;
+        }
         Ok(episode)
     }
 }

@@ -1,13 +1,14 @@
 //! A scripted episode for tests: real images, real pushes and the classical belief, with made-up gains.
 
 use nudge_core::arm::ArmTool;
-use nudge_core::belief::{Belief, BeliefUpdate, Classical, FloorPlan, SOLID};
+use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{self, ViewArray, ViewId};
-use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, StepOutcome, StepRecord, StepSeconds};
+use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, Judgement, StepOutcome, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
 use nudge_core::rng;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::score::{Scores, object_verdicts};
+use nudge_core::skill::SweptManipulation;
 use nudge_core::skill::push::{PushSampler, sample};
 use nudge_core::world::{TruthMap, World};
 
@@ -67,49 +68,51 @@ pub fn play(steps: usize) -> Played {
                 .collect();
             decision.best_push = candidates.iter().position(|c| c.rejection.is_none());
             if let Some(best) = decision.best_push {
-                let (of, swept) = (candidates[best].manipulation, candidates[best].swept.clone());
-                let solid = FloorPlan::new(&belief, SOLID);
-                let intervention = of.skill().intervention(&belief, &solid, &arm.arm, swept);
-                let prediction = Classical.predict(&belief, std::slice::from_ref(&intervention)).remove(0);
-                decision.action = Action::Manipulate(of);
+                let (manipulation, swept) = (candidates[best].manipulation, candidates[best].swept.clone());
+                let swept = SweptManipulation { manipulation, swept };
+                let prediction = Classical.predict(&belief, &[swept.intervention(&belief)]).remove(0);
+                decision.action = Action::Manipulate(manipulation);
                 decision.reason = Reason::PushTellsMore;
                 let pushed = world.execute(&arm.arm, candidates[best].motion.as_ref().expect("of a feasible one"));
                 belief.apply(&prediction);
                 truth = TruthMap::of(&grid, &world.bodies());
-                outcome = Some((intervention, prediction, pushed));
+                outcome = Some((swept, prediction, pushed));
             }
         }
-        let mut image = None;
+        let mut frame = None;
         let mut observation = None;
         if let Action::Look { view } = decision.action {
             let view = played.views.view(view).expect("view");
-            let taken = camera::render(&shelf, &world.bodies(), view, &played.views.intrinsics);
-            let seen = camera::project(&taken, view, &played.views.intrinsics, &shelf);
+            let taken = camera::render(&shelf, &world.bodies(), view, &played.views.intrinsics).frame;
+            let seen = camera::project(&taken, &shelf);
             belief = Classical.observe(&belief, &seen);
-            (image, observation) = (Some(taken), Some(seen));
+            (frame, observation) = (Some(taken), Some(seen));
         }
         let step = StepRecord {
             index,
             action: decision.action,
             decision,
-            scores: Scores::of(&belief, &truth),
-            objects: object_verdicts(&belief, &truth, &played.catalog),
-            dropped: Vec::new(),
-            displacement_m: 0.0,
+            entropy_nats: Scores::of(&belief, &truth).entropy_nats,
+            judgement: Some(Judgement {
+                scores: Scores::of(&belief, &truth),
+                objects: object_verdicts(&belief, &truth, &played.catalog),
+                dropped: Vec::new(),
+                displacement_m: 0.0,
+            }),
             motion_s: 0.0,
             push: None,
             seconds: StepSeconds::default(),
         };
         played.record.steps.push(step.clone());
-        let (intervention, prediction, manipulated) = match outcome {
-            Some((told, prediction, pushed)) => (Some(told), Some(prediction), Some(pushed)),
+        let (swept, prediction, manipulated) = match outcome {
+            Some((swept, prediction, pushed)) => (Some(swept), Some(prediction), Some(pushed)),
             None => (None, None, None),
         };
         played.outcomes.push(StepOutcome {
             record: step,
-            image,
+            frame,
             observation,
-            intervention,
+            swept,
             prediction,
             manipulated,
             motion: None,
@@ -119,6 +122,15 @@ pub fn play(steps: usize) -> Played {
         played.truths.push(truth.clone());
     }
     played
+}
+
+/// The same as a log of an episode whose truth nobody knows.
+pub fn without_truth(record: &EpisodeRecord) -> EpisodeRecord {
+    let mut record = record.clone();
+    record.scene.objects.clear();
+    record.prior.scores = None;
+    record.steps.iter_mut().for_each(|step| step.judgement = None);
+    record
 }
 
 fn record(scene: Scene, prior: Scores, budget: usize) -> EpisodeRecord {
@@ -137,7 +149,7 @@ fn record(scene: Scene, prior: Scores, budget: usize) -> EpisodeRecord {
             planner: PlannerSettings::default(),
             noise: None,
         },
-        prior,
+        prior: prior.into(),
         steps: Vec::new(),
     }
 }
@@ -148,15 +160,9 @@ fn decision(views: &ViewArray, index: usize) -> Decision {
     let second = ViewId(((index * 97 + 131) % count) as u16);
     let gains = (0..count).map(|at| 500.0 + 300.0 * ((at * 7 + index * 31) as f32 * 0.02).sin()).collect();
     Decision {
-        action: Action::Look { view },
-        reason: Reason::LookTellsMore,
         igv: 1234.5,
-        igm: 0.0,
-        reg: 0.0,
         pair: vec![view, second],
         gains,
-        candidates: Vec::new(),
-        best_push: None,
-        motion: None,
+        ..Decision::unweighed(Action::Look { view }, Reason::LookTellsMore)
     }
 }

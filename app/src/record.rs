@@ -9,6 +9,7 @@
 //! Entity names are in [`paths`] and nowhere else.
 
 pub(crate) mod blueprint;
+mod continued;
 pub(crate) mod decision;
 mod disk;
 pub(crate) mod eye;
@@ -30,11 +31,10 @@ use crate::verdicts::Judged;
 use disk::{Disk, Fault};
 use nudge_core::arm::{ArmTool, Joints};
 use nudge_core::belief::{Belief, Prediction};
-use nudge_core::camera::{Image, View, ViewArray, ViewId};
-use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome, StepRecord};
-use nudge_core::gain::GainField;
+use nudge_core::camera::{Frame, ViewArray, ViewId};
+use nudge_core::episode::{Episode, EpisodeRecord, NO_TRUTH, StepOutcome, StepRecord};
 use nudge_core::grid::{Grid, VoxelSet};
-use nudge_core::plan::{Action, PlannerSettings, gain_field};
+use nudge_core::plan::{self, Action, PlannerSettings};
 use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
@@ -74,12 +74,14 @@ pub struct State<'a> {
     pub bodies: &'a [Body],
     /// What is believed.
     pub belief: &'a Belief,
-    /// Voxels that do not count as a gain any more, if some do not.
-    pub seen: Option<&'a VoxelSet>,
-    /// What is.
-    pub truth: &'a TruthMap,
-    /// How they compare.
-    pub scores: &'a Scores,
+    /// Voxels that looks have seen and that no push has probably changed since.
+    pub seen: &'a VoxelSet,
+    /// What is, if that is known.
+    pub truth: Option<&'a TruthMap>,
+    /// How they compare, if that is known.
+    pub scores: Option<&'a Scores>,
+    /// Entropy of what is believed, nats.
+    pub entropy_nats: f64,
 }
 
 /// Writes an episode into a recording.
@@ -91,8 +93,8 @@ pub struct Recorder {
     file: PathBuf,
     /// What is wrong with the file.
     fault: Fault,
-    /// The belief before the next step, as rays see it.
-    field: Option<GainField>,
+    /// What can be gained in the next step.
+    gain: Option<plan::Gain>,
     /// Objects with a mesh in the recording that have not been cleared.
     shown: BTreeSet<ObjectId>,
     /// The truth that was last recorded.
@@ -107,7 +109,25 @@ impl Recorder {
         Self::begin(path, &title(episode.record()), &setting(episode))
     }
 
-    /// The same for an episode of which only the states are at hand: [`Recorder::record`] writes them one by one.
+    /// Goes on with the recording `old` of a run that was stopped, in the file `path` (overwritten): what it holds is copied.
+    /// `None` for a recording that does not hold every step of the episode.
+    pub fn go_on(path: &Path, old: &Path, episode: &Episode) -> Result<Option<Self>> {
+        let fault = Fault::default();
+        let disk = Disk::create(path, fault.clone()).map_err(|error| Error::io(path, error))?;
+        let steps = episode.record().steps.len();
+        let Some(store) = continued::copy(old, &disk, steps) else { return Ok(None) };
+        let stream = stream_into(disk, path, RecordingStreamBuilder::from_store_id(&store))?;
+        let mut recorder = Self::bare(stream, "", path, fault);
+        let counted = episode.record().config.planner.counted;
+        recorder.gain = Some(plan::Gain::new(counted, episode.belief(), episode.seen()));
+        recorder.shown = episode.bodies().iter().map(|body| body.id).collect();
+        recorder.truth = episode.truth().cloned();
+        recorder.robot_s = episode.record().steps.iter().map(|step| step.motion_s).sum();
+        recorder.flush()?;
+        Ok(Some(recorder))
+    }
+
+    /// Starts one for an episode of which only the states are at hand: [`Recorder::record`] writes them one by one.
     pub fn begin(path: &Path, name: &str, setting: &Setting<'_>) -> Result<Self> {
         let (stream, fault) = file_stream(path, name)?;
         let recorder = Self::bare(stream, "", path, fault);
@@ -133,7 +153,7 @@ impl Recorder {
             root: EntityPath::parse_forgiving(root),
             file: file.to_owned(),
             fault,
-            field: None,
+            gain: None,
             shown: BTreeSet::new(),
             truth: None,
             robot_s: 0.0,
@@ -151,15 +171,16 @@ impl Recorder {
     pub fn step(&mut self, episode: &Episode, outcome: &StepOutcome) -> Result<()> {
         let bodies = episode.bodies();
         self.record(&setting(episode), &state(episode, &bodies), Some(outcome))?;
-        self.remark(None, &Judged::by_scorer(&outcome.record.objects))
+        self.remark(None, &Judged::by_scorer(outcome.record.objects()))
     }
 
     /// Records a state with what led to it: without an outcome the prior. States come in the order of their steps.
     pub fn record(&mut self, setting: &Setting<'_>, state: &State<'_>, outcome: Option<&StepOutcome>) -> Result<()> {
-        let gain = outcome.zip(self.field.as_ref()).and_then(|(outcome, field)| gain::of(setting, field, outcome));
-        let surprise = outcome.and_then(|outcome| outcome.prediction.as_ref()).zip(self.truth.as_ref());
-        let surprise = surprise
-            .map(|(predicted, before)| predicted.surprise(&state.belief.grid, &before.changed_cells(state.truth)));
+        let gain = outcome.zip(self.gain.as_ref()).and_then(|(outcome, gain)| gain::of(setting, gain, outcome));
+        let predicted = outcome.and_then(|outcome| outcome.prediction.as_ref());
+        let changed = self.truth.as_ref().zip(state.truth).map(|(before, after)| before.changed_cells(after));
+        let surprise =
+            predicted.zip(changed).map(|(predicted, changed)| predicted.surprise(&state.belief.grid, &changed));
         self.robot(setting, state.step, outcome)?;
         self.state(setting, state)?;
         let surprise = surprise.map(|surprise| floor::picture(&picture::paint_surprise(&state.belief.grid, &surprise)));
@@ -167,11 +188,14 @@ impl Recorder {
         match outcome {
             Some(outcome) => self.outcome(setting, state.belief, outcome, gain.as_ref())?,
             None => {
-                let line = format!("prior: {}", decision::scores_line(state.scores));
+                let line = format!("prior: {}", decision::scores_line(state.scores, state.entropy_nats));
                 self.note(line, rerun::TextLogLevel::INFO)?;
+                if state.truth.is_none() {
+                    self.note(NO_TRUTH.to_owned(), rerun::TextLogLevel::INFO)?;
+                }
             }
         }
-        self.field = Some(gain_field(state.belief, state.seen));
+        self.gain = Some(plan::Gain::new(setting.planner.counted, state.belief, state.seen));
         self.flush()
     }
 
@@ -273,7 +297,7 @@ impl Recorder {
     /// Records bodies, belief, truth, error and scores.
     fn state(&mut self, setting: &Setting<'_>, state: &State<'_>) -> Result<()> {
         self.stream.set_time_sequence(paths::TIMELINE, state.step as i64);
-        if self.truth.is_none() {
+        if state.step == 0 {
             self.log(paths::CAMERA_VIEWS, &shapes::frusta_without_gain(setting.views))?;
         }
         self.bodies(setting, state.bodies)?;
@@ -284,16 +308,20 @@ impl Recorder {
         self.log(paths::BELIEF_SEMANTICS, &floor::classes(belief))?;
         self.log(paths::BELIEF_CERTAINTY, &floor::certainty(belief))?;
         self.log(paths::BELIEF_ENTROPY, &floor::picture(&picture::paint_entropy(belief)))?;
-        if self.truth.as_ref() != Some(state.truth) {
-            self.log(paths::TRUTH_OCCUPANCY, &voxels::true_classes(grid, state.truth, setting.catalog))?;
-            self.log(paths::TRUTH_LABELS, &floor::labels(grid, &state.truth.labels))?;
-            self.log(paths::TRUTH_OUTLINES, &floor::outlines(state.truth))?;
-            self.truth = Some(state.truth.clone());
+        if let Some(truth) = state.truth {
+            if self.truth.as_ref() != Some(truth) {
+                self.log(paths::TRUTH_OCCUPANCY, &voxels::true_classes(grid, truth, setting.catalog))?;
+                self.log(paths::TRUTH_LABELS, &floor::labels(grid, &truth.labels))?;
+                self.log(paths::TRUTH_OUTLINES, &floor::outlines(truth))?;
+                self.truth = Some(truth.clone());
+            }
+            self.log(paths::ERROR_OCCUPANCY, &voxels::errors(belief, truth))?;
+            self.log(paths::ERROR_SEMANTICS, &floor::picture(&picture::paint_errors(belief, truth)))?;
         }
-        self.log(paths::ERROR_OCCUPANCY, &voxels::errors(belief, state.truth))?;
-        self.log(paths::ERROR_SEMANTICS, &floor::picture(&picture::paint_errors(belief, state.truth)))?;
         for series in decision::SERIES {
-            self.log(&paths::score(series.key), &rerun::Scalars::single((series.value)(state.scores)))?;
+            if let Some(value) = series.at(state.scores, state.entropy_nats) {
+                self.log(&paths::score(series.key), &rerun::Scalars::single(value))?;
+            }
         }
         Ok(())
     }
@@ -331,10 +359,10 @@ impl Recorder {
         self.log_or_clear(paths::GAIN_VOXELS, gain.map(|gain| voxels::gains(grid, &gain.nats)))?;
         self.log_or_clear(paths::GAIN_LABEL, gain.map(|gain| gain.label(setting.shelf)))?;
         let any = !decision.candidates.is_empty();
-        self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision, setting.planner.gamma)))?;
-        match (record.action, &outcome.image) {
-            (Action::Look { view }, Some(image)) => self.look(setting, view, image)?,
-            _ => {
+        self.log_or_clear(paths::PUSH_CANDIDATES, any.then(|| shapes::candidates(decision)))?;
+        match &outcome.frame {
+            Some(frame) => self.look(frame)?,
+            None => {
                 for path in [paths::CAMERA_CURRENT, paths::OBSERVATION_DEPTH, paths::OBSERVATION_LABELS] {
                     self.log(path, &rerun::Clear::flat())?;
                 }
@@ -347,7 +375,7 @@ impl Recorder {
         self.log_or_clear(paths::PUSH_CHOSEN, done.map(shapes::chosen))?;
         let with_lines = done.filter(|done| !done.outline().lines.is_empty());
         self.log_or_clear(paths::PUSH_LINES, with_lines.map(|done| shapes::chosen_lines(Some(done))))?;
-        let told = outcome.intervention.as_ref();
+        let told = outcome.swept.as_ref();
         self.log_or_clear(paths::PUSH_SWEPT, told.map(|told| voxels::swept(grid, &told.swept)))?;
         self.predicted(grid, outcome.prediction.as_ref())?;
         let pushed = matches!(record.action, Action::Manipulate(_));
@@ -358,12 +386,11 @@ impl Recorder {
         self.warn(record)
     }
 
-    fn look(&self, setting: &Setting<'_>, view: nudge_core::camera::ViewId, image: &Image) -> Result<()> {
-        let Some(View { world_from_camera, .. }) = setting.views.views.get(usize::from(view.0)) else { return Ok(()) };
-        self.log(paths::CAMERA_CURRENT, &shapes::transform(world_from_camera))?;
-        self.log(paths::CAMERA_CURRENT, &shapes::pinhole(&setting.views.intrinsics))?;
-        self.log(paths::OBSERVATION_DEPTH, &shapes::depth_image(image, &setting.views.intrinsics))?;
-        self.log(paths::OBSERVATION_LABELS, &shapes::label_image(image))
+    fn look(&self, frame: &Frame) -> Result<()> {
+        self.log(paths::CAMERA_CURRENT, &shapes::transform(frame.world_from_camera()))?;
+        self.log(paths::CAMERA_CURRENT, &shapes::pinhole(frame.intrinsics()))?;
+        self.log(paths::OBSERVATION_DEPTH, &shapes::depth_image(frame))?;
+        self.log(paths::OBSERVATION_LABELS, &shapes::label_image(frame))
     }
 
     fn predicted(&self, grid: &Grid, prediction: Option<&Prediction>) -> Result<()> {
@@ -426,14 +453,18 @@ pub fn title(record: &EpisodeRecord) -> String {
 
 /// A stream into a file of its own, and what will be wrong with that.
 fn file_stream(path: &Path, name: &str) -> Result<(RecordingStream, Fault)> {
-    let failed = |error: &dyn std::fmt::Display| Error::io(path, std::io::Error::other(error.to_string()));
     let fault = Fault::default();
     let disk = Disk::create(path, fault.clone()).map_err(|error| Error::io(path, error))?;
-    let (_, store, properties, batches, hooks, _) =
-        RecordingStreamBuilder::new(APPLICATION).send_properties(false).into_args();
-    let stream = RecordingStream::new(store, properties, batches, hooks, Box::new(disk)).map_err(|e| failed(&e))?;
-    stream.send_recording_name(name).map_err(|e| failed(&e))?;
+    let stream = stream_into(disk, path, RecordingStreamBuilder::new(APPLICATION))?;
+    stream.send_recording_name(name).map_err(|error| Error::io(path, std::io::Error::other(error.to_string())))?;
     Ok((stream, fault))
+}
+
+/// A stream into a file that has been begun.
+fn stream_into(disk: Disk, path: &Path, builder: RecordingStreamBuilder) -> Result<RecordingStream> {
+    let (_, store, properties, batches, hooks, _) = builder.send_properties(false).into_args();
+    let stream = RecordingStream::new(store, properties, batches, hooks, Box::new(disk));
+    stream.map_err(|error| Error::io(path, std::io::Error::other(error.to_string())))
 }
 
 fn setting(episode: &Episode) -> Setting<'_> {
@@ -457,7 +488,8 @@ fn state<'a>(episode: &'a Episode, bodies: &'a [Body]) -> State<'a> {
         belief: episode.belief(),
         seen: episode.seen(),
         truth: episode.truth(),
-        scores: record.steps.last().map_or(&record.prior, |step| &step.scores),
+        scores: record.scores_after(record.steps.len()),
+        entropy_nats: record.entropy_after(record.steps.len()),
     }
 }
 

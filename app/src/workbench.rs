@@ -1,7 +1,7 @@
 //! The workbench: one window to see a belief, ask why, try something else, and share it.
 //!
 //! [`model`] is what the window shows and holds every choice a person has made; [`command`] is everything that can be
-//! asked; `panels/` are functions of the model that return commands; `app` carries them out. Episodes live on worker
+//! asked; `panels/` draw the model and return commands; `app` carries them out. Episodes live on worker
 //! threads (`worker`), floor maps and answers are made in the background (`latest`), files are written by tasks (`tasks`),
 //! and `viewer` alone touches Rerun's viewer. `shot` renders the same window without a display.
 
@@ -18,14 +18,15 @@ pub mod graphics;
 pub mod half_belief;
 mod icon;
 pub mod latest;
+pub mod layout_kind;
 pub mod menu;
 pub mod model;
 pub mod panels;
+pub mod part;
 pub mod recording_file;
 pub mod session;
 pub mod shot;
 pub mod space;
-pub mod space_layout;
 pub mod tasks;
 pub mod theme;
 pub mod threads;

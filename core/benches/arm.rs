@@ -195,8 +195,8 @@ fn pushes(scenes: &[Crowded]) {
         let (scene, bodies) = (&crowded.scene, crowded.scene.bodies(&catalog).expect("bodies"));
         let mut belief = Belief::uniform(scene.grid());
         for view in views.views.iter().step_by(37) {
-            let image = render(&scene.shelf, &bodies, view, &views.intrinsics);
-            belief = Classical.observe(&belief, &project(&image, view, &views.intrinsics, &scene.shelf));
+            let frame = render(&scene.shelf, &bodies, view, &views.intrinsics).frame;
+            belief = Classical.observe(&belief, &project(&frame, &scene.shelf));
         }
         let tool = ArmTool::standard(scene.shelf);
         let (wall, processor) = (Instant::now(), process_s());

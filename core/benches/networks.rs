@@ -2,6 +2,10 @@
 //!
 //! Medians of wall-clock time with all threads; a target is for two idle cores.
 
+#[path = "support/median.rs"]
+mod median;
+
+use median::median;
 use nudge_core::arm::ArmTool;
 use nudge_core::belief::{Belief, FloorPlan, Intervention, SOLID};
 use nudge_core::camera::{ViewArray, project, render};
@@ -9,9 +13,7 @@ use nudge_core::cnabu;
 use nudge_core::rng::stream;
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::skill::push::{PushSampler, sample};
-use std::hint::black_box;
 use std::path::Path;
-use std::time::Instant;
 
 /// Candidates that a decision weighs.
 const CANDIDATES: usize = 80;
@@ -26,9 +28,7 @@ fn main() {
     let update = cnabu::load(&cnabu::models_dir().expect("models/")).expect("weights");
 
     let observations: Vec<_> = (views.views.iter().step_by(37))
-        .map(|view| {
-            project(&render(&scene.shelf, &bodies, view, &views.intrinsics), view, &views.intrinsics, &scene.shelf)
-        })
+        .map(|view| project(&render(&scene.shelf, &bodies, view, &views.intrinsics).frame, &scene.shelf))
         .collect();
     let belief = observations.iter().fold(Belief::uniform(scene.grid()), |belief, seen| update.observe(&belief, seen));
     row("sigma_o, one observation", median(31, || update.observe(&belief, &observations[0])), 0.06);
@@ -39,7 +39,7 @@ fn main() {
     let feasible: Vec<Intervention> = drawn
         .into_iter()
         .filter(|c| c.rejection.is_none())
-        .map(|c| c.manipulation.skill().intervention(&belief, &solid, &tool.arm, c.swept))
+        .map(|c| c.manipulation.skill().intervention(&belief, &solid, c.swept))
         .collect();
     assert!(!feasible.is_empty(), "no candidate of {} is feasible", scene.name);
     // As many as a decision weighs, whatever this belief offers: what one costs does not depend on which it is.
@@ -53,16 +53,4 @@ fn main() {
 
 fn row(what: &str, seconds: f64, target: f64) {
     println!("{what:<50} {seconds:>8.3} s (target {target})");
-}
-
-fn median<T>(runs: usize, mut work: impl FnMut() -> T) -> f64 {
-    let mut seconds: Vec<f64> = (0..runs)
-        .map(|_| {
-            let started = Instant::now();
-            black_box(work());
-            started.elapsed().as_secs_f64()
-        })
-        .collect();
-    seconds.sort_by(f64::total_cmp);
-    seconds[runs / 2]
 }

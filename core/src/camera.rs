@@ -1,20 +1,28 @@
-//! Cameras: arrays of views, depth and label images by ray casting, the noise model, and the projection of an image
-//! into the grid.
+//! Cameras: arrays of views, frames (depth and classes as a camera gives them), frames of a simulated shelf by ray casting,
+//! the noise model, and the projection of a frame into the grid.
 //!
 //! A camera looks along its own +z with x right and y down (the usual optical frame); `world_from_camera` places it
 //! in the shelf's frame. Depth is the distance along the optical axis, metres.
 
+mod depth_code;
+mod frame;
+mod frame_file;
 mod noise;
+mod pinhole;
 mod project;
 mod reach;
 mod render;
 mod views;
 mod visibility;
+mod watch;
 
+pub use frame::{Frame, PixelClasses, Sensed, UNLABELLED, pose_from_matrix, pose_from_quaternion};
 pub use noise::NoiseModel;
+pub use pinhole::Pinhole;
 pub use project::project;
 pub use render::render;
 pub use visibility::{ObjectVisibility, UNSEEN_PX, hidden_count, hidden_objects, hidden_objects_while, visibility};
+pub use watch::HiddenWatch;
 
 use crate::grid::VoxelSet;
 use crate::{Point, Pose, Vector};
@@ -24,7 +32,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ViewId(pub u16);
 
-/// A pinhole camera; the principal point is the image's centre.
+/// The camera of a view array: a pinhole without distortion whose principal point is the image's centre. Frames carry the
+/// whole [`Pinhole`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Intrinsics {
@@ -88,22 +97,7 @@ pub struct ViewArray {
 /// No label: the cell was not seen.
 pub const UNOBSERVED: u8 = u8::MAX;
 
-/// What one view saw: row-major images from the top left.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Image {
-    /// Which view.
-    pub view: ViewId,
-    /// Width and height, pixels.
-    pub size: [usize; 2],
-    /// Depth per pixel, metres; 0 where the sensor gave none.
-    pub depth_m: Vec<f32>,
-    /// Class per pixel; background for shelf and emptiness.
-    pub labels: Vec<u8>,
-    /// Object per pixel, [`u16::MAX`] where none; for counting what shows, never for the belief.
-    pub objects: Vec<u16>,
-}
-
-/// An image projected into the grid: what the belief update sees.
+/// A frame projected into the grid: what the belief update sees.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapObservation {
     /// Voxels seen through.

@@ -15,6 +15,8 @@ mod net;
 #[cfg(feature = "cnabu")]
 mod observe_net;
 #[cfg(feature = "cnabu")]
+mod pool;
+#[cfg(feature = "cnabu")]
 mod predict;
 #[cfg(feature = "cnabu")]
 mod push_net;

@@ -33,6 +33,7 @@
 mod code;
 mod cover;
 mod field;
+mod layout;
 mod open;
 mod pair;
 mod ray;
@@ -46,7 +47,7 @@ pub use cover::{CELL_M, Coverage};
 pub use field::GainField;
 pub use open::{Openings, gain_together};
 pub use pair::{ViewPair, best_pair};
-pub use reach::TrueReach;
+pub use reach::{ReachAfter, TrueReach};
 pub use rescore::RayGains;
 
 use crate::camera::{ViewArray, ViewId};

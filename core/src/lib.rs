@@ -3,7 +3,7 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> arm -> world -> camera -> belief -> cnabu -> gain -> skill -> plan -> made_by -> score -> episode -> probe -> learn
+//! grid -> solid -> scene -> arm -> world -> camera -> environment -> belief -> cnabu -> gain -> skill -> plan -> made_by -> score -> episode -> probe -> learn
 //! ```
 //!
 //! Beside them stand what all of them may use: [`error`], [`files`], [`places`], [`rng`], [`shard`] and [`wall`].
@@ -15,6 +15,7 @@ pub mod arm;
 pub mod belief;
 pub mod camera;
 pub mod cnabu;
+pub mod environment;
 pub mod episode;
 pub mod error;
 pub mod files;

@@ -2,27 +2,34 @@
 //!
 //! Look (first view of IGV) if `IGV > IGM + gamma Reg`, else push; `Reg = min(0, H_s(belief) - H_s(predicted))` over the
 //! semantic map and `gamma` is [`GAMMA`] unless a user says otherwise ([`SETTINGS`]). A [`Decision`] keeps everything that was
-//! weighed.
+//! weighed, and by what: whoever shows it prints its [`Comparison`] and its [ranked candidates](Decision::ranked_candidates).
 
+mod because;
+mod comparison;
+mod counted;
 mod decide;
-mod look;
+mod gain;
 mod policy;
 mod rule;
 mod settings;
 mod weigh;
+mod worth;
 
+pub use comparison::{Comparison, DISTURBANCE, Rule, Term, TermKind, Winner, ranked};
+pub use counted::Counted;
 pub use decide::decide;
-pub use look::{gain_field, gain_sources};
+pub use gain::Gain;
 pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
-pub use weigh::{COARSE_VIEWS, disturbance, draw_candidates, push_sources};
+pub use weigh::{disturbance, draw_candidates};
+pub(crate) use worth::coarse;
+pub use worth::{COARSE_VIEWS, Sources};
 
 use crate::arm::{ArmTool, PhasedMotion};
-use crate::belief::{Belief, BeliefUpdate, CNABU};
+use crate::belief::{Belief, BeliefUpdate};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
-use crate::named;
 use crate::skill::{Ground, Manipulation, PushTruth, Rejection};
 use serde::{Deserialize, Serialize};
 
@@ -153,6 +160,9 @@ pub struct Decision {
     /// The arm's motion for the push that is the action, else for the best one; `None` where none was weighed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<PhasedMotion>,
+    /// The policy and the thresholds of its comparison; `None` until an episode takes it down.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rule: Option<Rule>,
 }
 
 /// What the episode remembers for the planner.
@@ -171,6 +181,23 @@ pub struct History {
 }
 
 impl Decision {
+    /// An action for which nothing was weighed.
+    pub fn unweighed(action: Action, reason: Reason) -> Self {
+        Self {
+            action,
+            reason,
+            igv: 0.0,
+            igm: 0.0,
+            reg: 0.0,
+            pair: Vec::new(),
+            gains: Vec::new(),
+            candidates: Vec::new(),
+            best_push: None,
+            motion: None,
+            rule: None,
+        }
+    }
+
     /// Gain of the best single view that was not used yet, nats.
     pub fn best_gain(&self) -> Option<f32> {
         self.pair.first().and_then(|view| self.gains.get(usize::from(view.0))).copied()
@@ -226,8 +253,8 @@ pub struct Situation<'a> {
     pub unreachable: &'a [ViewId],
     /// What happened so far.
     pub history: &'a History,
-    /// Voxels that do not count as a gain, for [`Counted::Unseen`].
-    pub seen: Option<&'a VoxelSet>,
+    /// Voxels that looks have seen and that no push has probably changed since: no gain for [`Counted::Unseen`].
+    pub seen: &'a VoxelSet,
     /// Number of actions in all.
     pub budget: usize,
     /// Seed of the episode.
@@ -241,70 +268,13 @@ pub struct Situation<'a> {
 impl Situation<'_> {
     /// What candidates are drawn from.
     fn ground(&self, settings: &PlannerSettings) -> Ground<'_> {
-        Ground { belief: self.belief, seen: self.seen, arm: self.arm, sampler: settings.push_sampler }
+        let seen = settings.counted.left_out(self.seen);
+        Ground { belief: self.belief, seen, arm: self.arm, sampler: settings.push_sampler }
     }
 
     /// The views that are offered, by id.
     pub fn offered(&self) -> Vec<ViewId> {
         self.views.views.iter().map(|view| view.id).filter(|view| !self.unreachable.contains(view)).collect()
-    }
-}
-
-/// Which voxels count as a gain, and what a push is worth.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Counted {
-    /// All voxels that the view may see, summed over its rays; a push is worth the best single view after it. As in the
-    /// paper.
-    #[default]
-    All,
-    /// Only voxels that no look has seen yet, or not since a push has probably changed them. Each voxel counts once: in
-    /// the gain of a view ([`crate::gain::Coverage`]), in IGV and in IGM. A push is worth the unseen space that it
-    /// opens to all views together ([`crate::gain::Openings`]); making seen voxels uncertain is no gain.
-    Unseen,
-}
-
-impl Counted {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::All, Self::Unseen];
-
-    /// The default for a belief update, by its name: the networks stay uncertain of edges however often they are looked
-    /// at, so with them only unseen voxels count.
-    pub fn of_belief(name: &str) -> Self {
-        if name == CNABU { Self::Unseen } else { Self::All }
-    }
-
-    /// What IGV is, as the end of a sentence.
-    pub fn of_looks(self) -> &'static str {
-        match self {
-            Self::All => "information gain of the best two views together",
-            Self::Unseen => "what the best two views together would see of what no look has seen",
-        }
-    }
-
-    /// What IGM is, as the end of a sentence.
-    pub fn of_pushes(self) -> &'static str {
-        match self {
-            Self::All => "the best view after the best push",
-            Self::Unseen => "what the best push opens to all views together",
-        }
-    }
-}
-
-impl std::fmt::Display for Counted {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::All => "all",
-            Self::Unseen => "unseen",
-        })
-    }
-}
-
-impl std::str::FromStr for Counted {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        named::parse(&Self::ALL, text)
     }
 }
 

@@ -16,8 +16,8 @@ pub use summary::{Measure, MeasureSummary, StepSummary};
 
 use crate::arm::PhasedMotion;
 use crate::belief::BeliefUpdate;
-use crate::episode::{Difference, Episode, EpisodeDir, EpisodeRecord, StepRecord, StoredTruth, revisit};
-use crate::plan::{Action, CandidateRecord, Reason};
+use crate::episode::{Difference, Episode, EpisodeDir, EpisodeRecord, NO_TRUTH, StepRecord, StoredTruth, revisit};
+use crate::plan::{Action, CandidateRecord, Reason, ranked};
 use crate::rng::stream;
 use crate::scene::Catalog;
 use crate::skill::{ArmClearance, Manipulation, PushTruth};
@@ -86,6 +86,13 @@ pub struct StepProbe {
     pub left_out: usize,
 }
 
+impl StepProbe {
+    /// Positions in `pushes` as the planner ranks them: the best one first.
+    pub fn ranked(&self) -> Vec<usize> {
+        ranked(self.chosen, self.pushes.iter().map(|push| push.promised_gain))
+    }
+}
+
 /// The steps of a record whose decisions have feasible push candidates, with how many: what can be probed.
 pub fn probable_steps(record: &EpisodeRecord) -> Vec<(usize, usize)> {
     let counted = record.steps.iter().map(|step| (step.index, feasible(step).count()));
@@ -130,6 +137,10 @@ pub fn probe(
     each: &mut dyn FnMut(&StepProbe),
 ) -> Result<(Vec<StepProbe>, Option<Difference>)> {
     let (record, path) = (directory.record()?, directory.path());
+    if !record.has_truth() {
+        let message = format!("cannot be probed: {NO_TRUTH}, only a simulated shelf tells what pushes would really do");
+        return Err(Error::input(path, "", message));
+    }
     for step in steps {
         check_step(path, &record, *step)?;
     }
@@ -143,19 +154,20 @@ pub fn probe(
         let done = episode.record().steps.len();
         if steps.contains(&(done + 1)) {
             stands_as_filed(directory, episode, done)?;
-            let probe = probe_step(episode, &record.steps[done], carried_out);
-            each(&probe);
-            probes.push(probe);
+            if let Some(probe) = probe_step(episode, &record.steps[done], carried_out) {
+                each(&probe);
+                probes.push(probe);
+            }
         }
         Ok(())
     })?;
     Ok((probes, difference))
 }
 
-/// Probes the decision of a step of the log, of which `episode` has done all before.
-pub fn probe_step(episode: &Episode, logged: &StepRecord, carried_out: &(dyn Fn() + Sync)) -> StepProbe {
+/// Probes the decision of a step of the log, of which `episode` has done all before; `None` where nothing is simulated.
+pub fn probe_step(episode: &Episode, logged: &StepRecord, carried_out: &(dyn Fn() + Sync)) -> Option<StepProbe> {
     let decision = &logged.decision;
-    let known = episode.counterfactual();
+    let known = episode.counterfactual()?;
     let (at, motions): (Vec<usize>, Vec<PhasedMotion>) = motions(episode, logged).into_iter().unzip();
     let truths = known.of_each(&motions, carried_out);
     let pushes: Vec<ProbedPush> =
@@ -165,17 +177,19 @@ pub fn probe_step(episode: &Episode, logged: &StepRecord, carried_out: &(dyn Fn(
         Action::Look { .. } => None,
         Action::Manipulate(done) => pushes.iter().position(|probed| probed.manipulation == done),
     };
-    StepProbe {
+    Some(StepProbe {
         step: logged.index,
         reason: decision.reason,
         igv: decision.igv,
         hidden: known.hidden().iter().map(|id| episode.name(*id)).collect(),
         chosen: position(decision.best_push),
         made,
-        agrees: made.map(|at| (pushes[at].displacement_m - logged.displacement_m).abs() <= SAME_M),
+        agrees: made
+            .zip(logged.displacement_m())
+            .map(|(at, moved_m)| (pushes[at].displacement_m - moved_m).abs() <= SAME_M),
         left_out: feasible(logged).count() - pushes.len(),
         pushes,
-    }
+    })
 }
 
 /// The feasible candidates of a step's decision, with their positions.
@@ -226,7 +240,9 @@ fn probed(episode: &Episode, candidate: usize, promised: &CandidateRecord, truth
 /// Makes sure that the bodies stand as they stood after so many actions.
 fn stands_as_filed(directory: &EpisodeDir, episode: &Episode, actions: usize) -> Result<()> {
     let now = StoredTruth::from(&TruthMap::of(&episode.grid(), &episode.bodies()));
-    if now == directory.read_truth(actions)? {
+    let filed = directory.read_truth(actions)?;
+    let same_objects = filed.objects.is_none() || filed.objects == now.objects;
+    if (&filed.occupancy, &filed.labels) == (&now.occupancy, &now.labels) && same_objects {
         return Ok(());
     }
     let path = directory.path().display();

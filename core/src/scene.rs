@@ -8,6 +8,7 @@ mod catalog;
 mod check;
 mod file;
 mod generate;
+mod lines;
 mod mesh;
 pub mod outline;
 mod overlap;
@@ -22,7 +23,7 @@ pub use body::{Body, ObjectId, Shelf};
 pub use catalog::{BACKGROUND, Background, CLASS_COUNT, Catalog, Class, ClassId, OBJECT_CLASS_COUNT};
 pub use check::{MAX_OBJECTS, MAX_VOXELS, Problem};
 pub use file::FORMAT;
-pub use generate::{GenerateConfig, generate};
+pub use generate::{Family, GenerateConfig, generate};
 pub(crate) use mesh::read_mesh_points;
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, Unit, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
@@ -129,10 +130,10 @@ impl Scene {
     /// The objects as bodies, by [`ObjectId`], each standing on the board where the scene puts it. The mass of a
     /// stretched object grows with its volume.
     pub fn bodies(&self, catalog: &Catalog) -> Result<Vec<Body>> {
-        self.bodies_at(catalog, &file::Places::without_file(format!("scene {}", self.name)))
+        self.bodies_at(catalog, &lines::Places::without_file(format!("scene {}", self.name)))
     }
 
-    fn bodies_at(&self, catalog: &Catalog, places: &file::Places) -> Result<Vec<Body>> {
+    fn bodies_at(&self, catalog: &Catalog, places: &lines::Places) -> Result<Vec<Body>> {
         let mut solids: BTreeMap<(&str, [u32; 3]), Arc<Solid>> = BTreeMap::new();
         let mut bodies = Vec::with_capacity(self.objects.len());
         for (at, object) in self.objects.iter().enumerate() {

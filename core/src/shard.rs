@@ -4,13 +4,29 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// The `index`-th of every `count` pieces of some work; all of them by default.
+/// The `index`-th of every `count` pieces of some work; all of them by default. A file with any other shard is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
 pub struct Shard {
     /// From 0.
     pub index: usize,
     /// Number of shards.
     pub count: usize,
+}
+
+/// What a file says.
+#[derive(Deserialize)]
+struct Stored {
+    index: usize,
+    count: usize,
+}
+
+impl TryFrom<Stored> for Shard {
+    type Error = String;
+
+    fn try_from(Stored { index, count }: Stored) -> Result<Self, String> {
+        if index < count { Ok(Self { index, count }) } else { Err(format!("{index}/{count} is no shard")) }
+    }
 }
 
 impl Shard {
@@ -54,6 +70,13 @@ mod tests {
         for wrong in ["3/3", "1", "a/b", "-1/2", "0/0"] {
             assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_file_with_a_shard_of_none_is_refused() {
+        let read = |text: &str| serde_json::from_str::<Shard>(text);
+        assert!(read(r#"{"index":1,"count":2}"#).is_ok_and(|shard| shard == Shard { index: 1, count: 2 }));
+        assert!(read(r#"{"index":0,"count":0}"#).is_err_and(|error| error.to_string().contains("0/0 is no shard")));
     }
 
     #[test]

@@ -20,7 +20,7 @@ mod shown;
 
 pub use clearance::{AVOIDED, ArmClearance};
 pub use counterfactual::{Counterfactual, PushTruth, REACH_DENSITY};
-pub use manipulation::{intended, random_candidate};
+pub use manipulation::{SweptManipulation, intended, random_candidate};
 pub use push::{Push, PushSampler};
 pub use registry::{Manipulation, SkillKind, SkillSet};
 pub use rejection::{Rejection, Stage};
@@ -73,7 +73,7 @@ pub trait Skill {
 
     /// What a belief update is told of it. `solid` holds the floor cells on which something stands
     /// ([`SOLID`](crate::belief::SOLID)), `swept` is what the arm sweeps until it turns back.
-    fn intervention(&self, belief: &Belief, solid: &FloorPlan, arm: &Arm, swept: VoxelSet) -> Intervention;
+    fn intervention(&self, belief: &Belief, solid: &FloorPlan, swept: VoxelSet) -> Intervention;
 
     /// How far the tip is to move in contact, metres.
     fn way_m(&self) -> f32;

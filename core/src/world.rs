@@ -14,6 +14,7 @@ use crate::scene::{Body, ObjectId, Shelf};
 use crate::solid::Bounds;
 use crate::{Point, Pose};
 use physics::Physics;
+use serde::{Deserialize, Serialize};
 
 /// Thickness of the shelf's panels outside its interior, metres.
 pub const PANEL_M: f32 = 0.02;
@@ -43,6 +44,15 @@ pub struct World {
     /// Per body, whether it has left the board.
     dropped: Vec<bool>,
     physics: Physics,
+}
+
+/// Where a body stands, and whether it has left the board.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Standing {
+    /// Its pose; of a dropped one the last before it was taken away.
+    pub world_from_body: Pose,
+    /// Whether it has left the board.
+    pub dropped: bool,
 }
 
 /// What a manipulation did.
@@ -95,6 +105,24 @@ impl World {
     /// The bodies where they are now, dropped ones left out.
     pub fn bodies(&self) -> Vec<Body> {
         self.bodies.iter().zip(&self.dropped).filter(|(_, dropped)| !**dropped).map(|(body, _)| body.clone()).collect()
+    }
+
+    /// Where every body stands, in the order of the bodies that the world was made of.
+    pub fn standing(&self) -> Vec<Standing> {
+        let both = self.bodies.iter().zip(&self.dropped);
+        both.map(|(body, dropped)| Standing { world_from_body: body.world_from_body, dropped: *dropped }).collect()
+    }
+
+    /// This world's bodies as they would be elsewhere, dropped ones left out; the world stays as it is.
+    ///
+    /// # Errors
+    /// In words, for another number of bodies.
+    pub fn bodies_at(&self, standing: &[Standing]) -> Result<Vec<Body>, String> {
+        if standing.len() != self.bodies.len() {
+            return Err(format!("{} bodies where the scene has {}", standing.len(), self.bodies.len()));
+        }
+        let both = self.bodies.iter().zip(standing).filter(|(_, at)| !at.dropped);
+        Ok(both.map(|(body, at)| Body { world_from_body: at.world_from_body, ..body.clone() }).collect())
     }
 
     /// Kinetic energy of all bodies, joules.

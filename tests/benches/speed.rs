@@ -2,6 +2,10 @@
 //!
 //! Each figure is the median of a few runs on this machine as it is; a target is for two idle cores.
 
+#[path = "../../core/benches/support/median.rs"]
+mod median;
+
+use median::median;
 use nudge_core::arm::{ArmTool, PhasedMotion};
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, ViewId, project, render};
@@ -12,7 +16,6 @@ use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::skill::{ArmClearance, Push, Skill};
 use nudge_core::world::{TruthMap, World};
 use nudge_tests::{nudge_bin, root};
-use std::hint::black_box;
 use std::process::Command;
 use std::sync::Arc;
 use std::time::Instant;
@@ -28,12 +31,12 @@ fn main() {
     let view = array.view(ViewId(145)).expect("view");
     let image = median(9, || render(&scene.shelf, &bodies, view, &array.intrinsics));
     row("image, depth and labels, 640 x 480", image, None);
-    let picture = render(&scene.shelf, &bodies, view, &array.intrinsics);
-    let projection = median(9, || project(&picture, view, &array.intrinsics, &scene.shelf));
+    let picture = render(&scene.shelf, &bodies, view, &array.intrinsics).frame;
+    let projection = median(9, || project(&picture, &scene.shelf));
     row("observation: image and projection", image + projection, Some(0.15));
     row("truth map", median(9, || TruthMap::of(&grid, &bodies)), Some(0.05));
     let belief = nudge_core::belief::Belief::uniform(grid);
-    let observation = project(&picture, view, &array.intrinsics, &scene.shelf);
+    let observation = project(&picture, &scene.shelf);
     row("classical belief update", median(9, || Classical.observe(&belief, &observation)), None);
 
     let fifteen = fifteen_objects(&catalog);
@@ -56,19 +59,6 @@ fn main() {
     row("decision after 5 steps: 300 views, pairs, 80 pushes", median(5, || episode.decide()), None);
 
     whole_episode();
-}
-
-/// The median wall-clock time of `runs` runs, seconds.
-fn median<T>(runs: usize, mut work: impl FnMut() -> T) -> f64 {
-    let mut seconds: Vec<f64> = (0..runs)
-        .map(|_| {
-            let started = Instant::now();
-            black_box(work());
-            started.elapsed().as_secs_f64()
-        })
-        .collect();
-    seconds.sort_by(f64::total_cmp);
-    seconds[runs / 2]
 }
 
 fn row(what: &str, seconds: f64, target: Option<f64>) {

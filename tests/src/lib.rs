@@ -1,5 +1,7 @@
 //! What the end-to-end tests share: running the binary, and the stock tools that read what it writes.
 
+pub mod sources;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -55,13 +57,19 @@ pub fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// A tool of the virtual environment that `make test` sets up (`NUDGE_VENV`); `None`, with a word on stderr, where
-/// there is none.
+/// A tool of the virtual environment that `make test` sets up and names in `NUDGE_VENV`. `None` only where that is set to
+/// nothing, which says that what needs the tool shall not be checked.
+///
+/// # Panics
+/// Where nothing is said, and where the tool is missing: a test that checks nothing is not to pass in silence.
 pub fn venv_tool(name: &str) -> Option<PathBuf> {
-    let Some(venv) = std::env::var_os("NUDGE_VENV") else {
-        eprintln!("skipped: NUDGE_VENV is not set, so there is no {name} (make test sets it)");
+    let venv = std::env::var_os("NUDGE_VENV");
+    let venv =
+        venv.unwrap_or_else(|| panic!("{name} is needed: `make test` sets NUDGE_VENV; set it to nothing to skip"));
+    if venv.is_empty() {
+        eprintln!("not checked: NUDGE_VENV is empty, so there is no {name}");
         return None;
-    };
+    }
     let tool = Path::new(&venv).join("bin").join(name);
     assert!(tool.exists(), "{} is missing", tool.display());
     Some(tool)
@@ -106,3 +114,43 @@ pub fn in_own_mounts(script: &str) -> Command {
     command.args(["--map-root-user", "--mount", "bash", "-c", script, "bash"]);
     command
 }
+
+/// A folder of one test's files.
+pub struct Folder(tempfile::TempDir);
+
+impl Folder {
+    /// A new one, gone when this is dropped.
+    #[expect(clippy::new_without_default, reason = "a folder on the disk is no default value")]
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().expect("tempdir"))
+    }
+
+    /// The path of a file in it, or of the folder itself for an empty name.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// The path of a file that may not be there yet, as an argument.
+    pub fn name(&self, name: &str) -> String {
+        argument(&self.path(name))
+    }
+
+    /// Writes a file and returns its path as an argument.
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        std::fs::write(self.path(name), content).expect("written");
+        self.name(name)
+    }
+}
+
+/// A path as an argument.
+pub fn argument(path: &Path) -> String {
+    path.to_str().expect("utf-8").to_owned()
+}
+
+/// A scene of the given objects that is quick to map: a small shelf of coarse voxels.
+pub fn small_scene(objects: &str) -> String {
+    format!("format = 1\nname = \"small\"\n[shelf]\nsize = [0.3, 0.2, 0.2]\nvoxel_m = 0.01\n{objects}")
+}
+
+/// A tin that stands in [`small_scene`].
+pub const TIN: &str = "[[object]]\nclass = \"tomato_can\"\nposition = [0.0, 0.1]\n";

@@ -1,25 +1,7 @@
 //! Bad input: one line that names the file and the place, exit code 2, nothing half-written.
 
-use nudge_tests::{nudge, nudge_fails, nudge_ok, text};
-use std::path::{Path, PathBuf};
-
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().expect("tempdir"))
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, content: &str) -> String {
-        let path = self.path(name);
-        std::fs::write(&path, content).expect("write");
-        path.to_str().expect("utf-8").to_owned()
-    }
-}
+use nudge_tests::{Folder, nudge, nudge_fails, nudge_ok, text};
+use std::path::Path;
 
 fn scene(objects: &str) -> String {
     format!("format = 1\nname = \"t\"\n[shelf]\nsize = [0.8, 0.4, 0.4]\n{objects}")

@@ -207,3 +207,59 @@ fn an_episode_of_other_weights_is_not_resumed_and_a_replay_says_which() {
     let said = run(&root().join("models"), &["--resume"]);
     assert!(said.status.success(), "{}", text(&said.stderr));
 }
+
+/// A processor that this process may run on.
+fn one_processor() -> String {
+    let status = std::fs::read_to_string("/proc/self/status").expect("Linux");
+    let list = status.lines().find_map(|line| line.strip_prefix("Cpus_allowed_list:")).expect("processors");
+    list.trim().split([',', '-']).next().expect("one").to_owned()
+}
+
+#[test]
+fn the_networks_believe_and_decide_the_same_on_any_number_of_threads_and_pinned_to_one_core() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let processor = one_processor();
+    let with_threads = |threads: &'static str| vec!["env", threads];
+    let ways = [
+        ("1", with_threads("RAYON_NUM_THREADS=1")),
+        ("2", with_threads("RAYON_NUM_THREADS=2")),
+        ("4", with_threads("RAYON_NUM_THREADS=4")),
+        ("pinned", vec!["taskset", "-c", &processor]),
+        ("pinned-4", vec!["taskset", "-c", &processor, "env", "RAYON_NUM_THREADS=4"]),
+    ];
+    let episode = |(name, way): &(&str, Vec<&str>)| {
+        let out = dir.path().join(name);
+        let output = Command::new(way[0])
+            .args(&way[1..])
+            .arg(nudge_bin())
+            .args(["run", "scenes/demo/behind-the-boxes.toml", "--policy", "mem", "--belief", "cnabu", "--budget", "3"])
+            // Pushes are weighed from the first step on, so that both networks have a part in every decision.
+            .args(["--quiet-steps", "0", "--candidates", "8", "--seed", "2", "--json", "--out"])
+            .arg(&out)
+            .current_dir(root())
+            .output()
+            .expect("it starts");
+        assert!(output.status.success(), "{name}: {}", text(&output.stderr));
+        let mut record: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        record["made_by"]["threads"] = Value::Null;
+        for step in record["steps"].as_array_mut().expect("steps") {
+            step["seconds"] = Value::Null;
+        }
+        let belief = |n: usize| std::fs::read(out.join(format!("beliefs/{n:03}.npz"))).expect("a belief");
+        (record, (0..=3).map(belief).collect::<Vec<_>>())
+    };
+    let (record, beliefs) = episode(&ways[0]);
+    let weighed = record["steps"]
+        .as_array()
+        .expect("steps")
+        .iter()
+        .filter(|step| step["decision"]["candidates"].as_array().is_some_and(|pushes| !pushes.is_empty()));
+    assert!(weighed.count() > 0, "no push was weighed");
+    for way in &ways[1..] {
+        let (other, others) = episode(way);
+        for (n, (one, other)) in beliefs.iter().zip(&others).enumerate() {
+            assert!(one == other, "{}: belief {n} differs", way.0);
+        }
+        assert!(record == other, "{}: the records differ", way.0);
+    }
+}

@@ -110,3 +110,33 @@ fn a_log_tells_how_long_making_and_scoring_still_take() {
     told(&["data", "maps", "--count", "3", "--seed", "9", "--out", out], "data maps");
     told(&["calibrate", "--data", out, "--beliefs", "classical", "--json"], "classical on views");
 }
+
+#[test]
+fn what_pushes_are_worth_is_made_summed_up_and_refused_in_one_line() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("w");
+    let out = out.to_str().expect("utf-8");
+    let quick = ["--belief", "classical", "--views", "real75", "--pushes", "2", "--families", "walls"];
+    let made = [&["data", "worth", "--count", "1", "--seed", "9", "--out", out, "--json"][..], &quick].concat();
+    let said = nudge(&made);
+    assert!(said.status.success(), "{}", text(&said.stderr));
+    let document: serde_json::Value = serde_json::from_slice(&said.stdout).expect("json");
+    assert_eq!((&document["samples"], &document["made"]), (&1.into(), &1.into()));
+    assert!(document["bytes_per_sample"].as_f64().is_some_and(|bytes| bytes < 300e3), "{document}");
+    let said = nudge(&["data", "worth", "--summary", out, "--json"]);
+    let document: serde_json::Value = serde_json::from_slice(&said.stdout).expect("json");
+    assert_eq!((&document["summaries"][0]["states"], &document["summaries"][1]["of"]), (&1.into(), &"walls".into()));
+
+    let refused = |args: &[&str], words: &str| {
+        let said = nudge(&[&["data", "worth"], args].concat());
+        let message = text(&said.stderr);
+        assert_eq!(said.status.code(), Some(2), "{message}");
+        assert!(message.contains(words), "{message}");
+        message
+    };
+    let one_line = |message: String| assert_eq!(message.trim_end().lines().count(), 1, "{message}");
+    one_line(refused(&["--count", "0", "--out", out], "--count must be at least 1"));
+    one_line(refused(&["--count", "2", "--seed", "8", "--out", out, "--belief", "classical"], "seed"));
+    one_line(refused(&["--summary", dir.path().to_str().expect("utf-8")], "holds no data"));
+    refused(&["--count", "1", "--out", out, "--families", "wall"], "unknown family \"wall\"");
+}

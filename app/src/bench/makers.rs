@@ -1,8 +1,7 @@
 //! Who made the results of a bench, and whose results may join.
 
-use super::plan::Plan;
+use super::plan::{AlsoMadeBy, Plan};
 use nudge_core::made_by::MadeBy;
-use serde::{Deserialize, Serialize};
 
 /// Whether results of other weights, other code of the method or other settings may join.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,18 +10,6 @@ pub enum Mixing {
     Refused,
     /// They join, and `bench.json` and the report say so.
     Allowed,
-}
-
-/// Another maker of a bench's results, beside the one that began it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AlsoMadeBy {
-    /// What made them; `None` where nothing tells.
-    pub made_by: Option<MadeBy>,
-    /// What is other than in the bench's own `made_by`, in words.
-    pub differs: Vec<String>,
-    /// Whether it keeps results from standing together: `--allow-mixed` let it in. Another commit with the same code of the
-    /// method, for one, does not.
-    pub mixed: bool,
 }
 
 impl Plan {

@@ -1,6 +1,5 @@
 //! What a bench consists of: sets of scenes, policies, seeds, a budget, and which share of it is this shard's.
 
-use super::makers::AlsoMadeBy;
 use nudge_core::camera::NoiseModel;
 use nudge_core::files::names_in;
 use nudge_core::made_by::MadeBy;
@@ -14,6 +13,9 @@ use std::path::{Path, PathBuf};
 
 /// The format number of `bench.json`.
 pub const FORMAT: u32 = 1;
+
+/// Most episodes that a bench may have.
+const MAX_EPISODES: u64 = 1_000_000;
 
 /// `bench.json`: which episodes a bench consists of.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -93,6 +95,18 @@ pub struct BrokenScene {
     pub error: String,
 }
 
+/// Another maker of a bench's results, beside the one that began it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AlsoMadeBy {
+    /// What made them; `None` where nothing tells.
+    pub made_by: Option<MadeBy>,
+    /// What is other than in the bench's own `made_by`, in words.
+    pub differs: Vec<String>,
+    /// Whether it keeps results from standing together: `--allow-mixed` let it in. Another commit with the same code of the
+    /// method, for one, does not.
+    pub mixed: bool,
+}
+
 /// One episode of a bench, by positions in its plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct EpisodeId {
@@ -127,6 +141,33 @@ impl Plan {
             }
         }
         all
+    }
+
+    /// Checks a plan that was read from `path`: how many episodes it has, the numbers of scenes and settings, and names that
+    /// lead out of the bench's directory.
+    ///
+    /// # Errors
+    /// For what no bench of this program has.
+    pub(super) fn check(&self, path: &Path) -> Result<()> {
+        let scenes: usize = self.sets.iter().map(|set| set.scenes.len()).sum();
+        let of_a_seed = scenes as u64 * self.policies.len() as u64;
+        if of_a_seed.checked_mul(self.seeds).is_none_or(|count| count > MAX_EPISODES) {
+            let message = format!("{} seeds of {of_a_seed} episodes; the limit is {MAX_EPISODES} episodes", self.seeds);
+            return Err(Error::input(path, "seeds", message));
+        }
+        let is_one_name = |name: &str| Path::new(name).file_name().is_some_and(|file| file == name);
+        for set in &self.sets {
+            let mut names = std::iter::once(&set.name).chain(set.scenes.iter().map(|scene| &scene.id));
+            if let Some(name) = names.find(|name| !is_one_name(name)) {
+                return Err(Error::input(path, "sets", format!("`{name}` is no name of a set or a scene")));
+            }
+            set.scenes.iter().try_for_each(|scene| scene.scene.check_numbers(path))?;
+        }
+        let planners = self.policies.iter().filter_map(|policy| policy.planner.as_ref());
+        for planner in std::iter::once(&self.planner).chain(planners) {
+            planner.check().map_err(|fault| Error::input(path, "planner", fault.to_string()))?;
+        }
+        Ok(())
     }
 
     /// An episode in words: `high/box-wall, random, seed 2`.
@@ -318,6 +359,25 @@ pub(super) mod tests {
         let episodes = plan(None).episodes();
         assert_eq!(episodes.len(), 2 * (3 + 1));
         assert!(episodes[..4].iter().all(|episode| episode.seed == 0), "seed 0 of everything comes first");
+    }
+
+    #[test]
+    fn a_bench_of_endless_seeds_never_opened_and_names_led_out_of_its_folder() {
+        let refused = |change: &dyn Fn(&mut Plan)| {
+            let mut changed = plan(None);
+            change(&mut changed);
+            changed.check(Path::new("bench.json")).map_err(|error| error.to_string())
+        };
+        assert_eq!(refused(&|_| ()), Ok(()));
+        let line = refused(&|plan| plan.seeds = u64::MAX).expect_err("endless");
+        assert!(line.starts_with("bench.json: seeds: 18446744073709551615 seeds of 4 episodes"), "{line}");
+        for name in ["../../a", "..", "a/b", "/a", ""] {
+            let line = refused(&|plan| name.clone_into(&mut plan.sets[0].name)).expect_err("leads out");
+            assert!(line.contains(&format!("`{name}` is no name")), "{line}");
+            assert!(refused(&|plan| name.clone_into(&mut plan.sets[0].scenes[1].id)).is_err(), "{name}");
+        }
+        assert!(refused(&|plan| plan.sets[0].scenes[0].scene.shelf.size[0] = 1e30).is_err());
+        assert!(refused(&|plan| plan.planner.candidates = usize::MAX).is_err());
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! What a bench keeps of an episode.
 
 use super::plan::{EpisodeId, Plan};
-use nudge_core::episode::{EpisodeRecord, StepRecord, StepSeconds};
+use nudge_core::episode::{EpisodeRecord, NO_TRUTH, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, PolicyKind, Reason};
 use nudge_core::score::{ObjectVerdict, Scores, Tally, Verdict};
+use nudge_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// The format number of results.
@@ -114,15 +115,19 @@ pub fn tallied_steps(budget: usize) -> [usize; 2] {
 
 impl EpisodeResult {
     /// The result of a finished episode.
+    ///
+    /// # Errors
+    /// For an episode without truth: benches compare scores.
     pub fn new(
         plan: &Plan,
         id: EpisodeId,
         record: &EpisodeRecord,
         hidden: Vec<u16>,
         tallies: Vec<(usize, Tally)>,
-    ) -> Self {
+    ) -> Result<Self> {
         let set = &plan.sets[id.set];
-        Self {
+        let without = || Error::Usage(format!("{NO_TRUTH}: a bench compares scores"));
+        Ok(Self {
             format: FORMAT,
             version: record.version.clone(),
             made_by: plan.made_by.as_ref().map(|maker| maker.fingerprint.clone()),
@@ -134,11 +139,11 @@ impl EpisodeResult {
             budget: record.config.budget,
             objects: record.scene.objects.len(),
             hidden,
-            prior: record.prior,
-            steps: record.steps.iter().map(StepResult::new).collect(),
-            verdicts: record.steps.last().map(|step| step.objects.clone()).unwrap_or_default(),
+            prior: record.prior.scores.ok_or_else(without)?,
+            steps: record.steps.iter().map(StepResult::new).collect::<Option<_>>().ok_or_else(without)?,
+            verdicts: record.steps.last().map(|step| step.objects().to_vec()).unwrap_or_default(),
             tallies,
-        }
+        })
     }
 
     /// Whether this is the result of an episode of a plan, whole and of one of its makers.
@@ -184,22 +189,23 @@ impl EpisodeResult {
 }
 
 impl StepResult {
-    fn new(step: &StepRecord) -> Self {
+    fn new(step: &StepRecord) -> Option<Self> {
+        let judgement = step.judgement.as_ref()?;
         let gain = match step.action {
-            Action::Look { view } => step.decision.gains.get(usize::from(view.0)).copied(),
+            Action::Look { .. } => step.decision.promised(),
             Action::Manipulate(_) => None,
         };
-        Self {
+        Some(Self {
             action: step.action,
             reason: step.decision.reason,
             igv: step.decision.igv,
             igm: step.decision.igm,
             reg: step.decision.reg,
             gain,
-            scores: step.scores,
-            verdicts: VerdictCounts::of(&step.objects),
-            dropped: step.dropped.clone(),
-            displacement_m: step.displacement_m,
-        }
+            scores: judgement.scores,
+            verdicts: VerdictCounts::of(&judgement.objects),
+            dropped: judgement.dropped.clone(),
+            displacement_m: judgement.displacement_m,
+        })
     }
 }

@@ -110,6 +110,7 @@ impl BenchDir {
             let message = format!("is {}, this version reads {FORMAT}", plan.format);
             return Err(Error::input(&path, "format", message));
         }
+        plan.check(&path)?;
         Ok(plan)
     }
 

@@ -149,7 +149,7 @@ impl<'a> Shared<'a> {
         let recording = self.record.then(|| self.directory.path().join(BenchDir::recording(self.plan, id)));
         let (episode, tallies) = run_episode(self.plan, id, self.catalog.clone(), recording.as_deref())?;
         let record = episode.record();
-        let result = EpisodeResult::new(self.plan, id, record, hidden, tallies);
+        let result = EpisodeResult::new(self.plan, id, record, hidden, tallies)?;
         let total = started.elapsed().as_secs_f64();
         let steps = record.steps.iter().map(|step| step.seconds).collect();
         self.directory.file_episode(self.plan, id, &result, &EpisodeSeconds { threads, total, steps })?;
@@ -182,8 +182,8 @@ pub fn run_episode(
     let mut tallies = Vec::new();
     let mut note = |episode: &Episode| {
         let actions = episode.record().steps.len();
-        if tallied_steps(plan.budget).contains(&actions) {
-            tallies.push((actions, Tally::of(episode.belief(), episode.truth())));
+        if let Some(truth) = episode.truth().filter(|_| tallied_steps(plan.budget).contains(&actions)) {
+            tallies.push((actions, Tally::of(episode.belief(), truth)));
         }
     };
     if let Some(path) = recording {

@@ -11,6 +11,8 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
+mod worth;
+
 /// Make training data: random scenes, settled, observed, with truth.
 #[derive(clap::Args, Debug)]
 pub struct Args {
@@ -24,6 +26,8 @@ enum Command {
     Maps(MakeArgs),
     /// Scenes after one to ten views, with pushes and the truth before and after: data for sigma_m
     Pushes(MakeArgs),
+    /// States along episodes, with pushes that are carried out from each: data for what pushes are worth
+    Worth(worth::Args),
 }
 
 #[derive(clap::Args, Debug)]
@@ -71,6 +75,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match &args.command {
         Command::Maps(args) => make_data::<MapSample>(args, Kind::Maps),
         Command::Pushes(args) => make_data::<PushSample>(args, Kind::Pushes),
+        Command::Worth(args) => worth::run(args),
     }
 }
 

@@ -64,14 +64,28 @@ impl Progress {
 
     /// So many units are done, and the rest is expected to take so long.
     pub fn at_with(&self, done: usize, left: Duration) {
+        self.tell(done, left, None);
+    }
+
+    fn tell(&self, done: usize, left: Duration, rate: Option<&str>) {
         self.bar.set_position(done as u64);
-        self.bar.set_message(format!("about {} left", words(left)));
+        let rate = rate.map_or(String::new(), |rate| format!("{rate}, "));
+        self.bar.set_message(format!("{rate}about {} left", words(left)));
         let Some(lines) = &self.lines else { return };
         let mut said = lines.lock().unwrap_or_else(PoisonError::into_inner);
         let now = self.started.elapsed();
         if is_due(*said, now, done >= self.of) {
             *said = Some(now);
-            eprintln!("{}", line(&self.what, [self.begun_at, done, self.of], now, left));
+            eprintln!("{}", line(&self.what, [self.begun_at, done, self.of], &rate, now, left));
+        }
+    }
+
+    /// So many units are done, and what is told of how fast it goes.
+    pub fn at_rate(&self, done: usize, rate: &str) {
+        let (made, to_come) = (done.saturating_sub(self.begun_at), self.of.saturating_sub(done));
+        if made > 0 {
+            let left = self.started.elapsed().mul_f64(to_come as f64 / made as f64);
+            self.tell(done, left, Some(rate));
         }
     }
 
@@ -96,12 +110,12 @@ fn is_due(said: Option<Duration>, now: Duration, is_last: bool) -> bool {
     said.is_none_or(|said| is_last || now.saturating_sub(said) >= LEAST_PAUSE.max(now / PART))
 }
 
-fn line(what: &str, [begun_at, done, of]: [usize; 3], elapsed: Duration, left: Duration) -> String {
+fn line(what: &str, [begun_at, done, of]: [usize; 3], rate: &str, elapsed: Duration, left: Duration) -> String {
     if done >= of {
         return format!("{what}: {done}/{of} in {}", words(elapsed));
     }
     let each = elapsed.as_secs_f64() / done.saturating_sub(begun_at).max(1) as f64;
-    format!("{what}: {done}/{of}, {each:.1} s each, about {} left", words(left))
+    format!("{what}: {done}/{of}, {each:.1} s each, {rate}about {} left", words(left))
 }
 
 /// A time in words: `3 h 12 min`, `5 min`, `40 s`.
@@ -135,12 +149,12 @@ mod tests {
 
     #[test]
     fn a_line_tells_what_how_far_and_how_long_still() {
-        let told = line("calibrate", [0, 12, 300], seconds(24), seconds(576));
+        let told = line("calibrate", [0, 12, 300], "", seconds(24), seconds(576));
         assert_eq!(told, "calibrate: 12/300, 2.0 s each, about 10 min left");
         // What was there before took no time.
-        let told = line("data", [100, 110, 200], seconds(20), seconds(180));
-        assert_eq!(told, "data: 110/200, 2.0 s each, about 3 min left");
-        assert_eq!(line("data", [100, 200, 200], seconds(200), seconds(0)), "data: 200/200 in 3 min");
+        let told = line("data", [100, 110, 200], "7.1 pushes per second, ", seconds(20), seconds(180));
+        assert_eq!(told, "data: 110/200, 2.0 s each, 7.1 pushes per second, about 3 min left");
+        assert_eq!(line("data", [100, 200, 200], "", seconds(200), seconds(0)), "data: 200/200 in 3 min");
     }
 
     #[test]

@@ -1,8 +1,9 @@
-//! `nudge replay`: re-run an episode from its log and verify every step.
+//! `nudge replay`: simulate an episode again from its log, or infer its beliefs again from its filed frames, and verify every
+//! step.
 
 use super::progress::Progress;
 use crate::driver::belief_update;
-use nudge_core::episode::{Agreement, EpisodeDir, replay};
+use nudge_core::episode::{Agreement, EpisodeDir, infer, replay};
 use nudge_core::scene::Catalog;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -14,6 +15,9 @@ pub struct Args {
     episode: PathBuf,
     #[command(flatten)]
     device: super::DeviceArgs,
+    /// Simulate and decide nothing: infer every belief again from the frames that are filed in the episode's directory
+    #[arg(long)]
+    infer: bool,
     /// Print what was found as JSON
     #[arg(long)]
     json: bool,
@@ -29,7 +33,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         super::warn(&format!("{}: {words}", args.episode.display()));
     }
     let progress = Progress::new("replay", record.steps.len());
-    let report = replay(&directory, Arc::new(Catalog::standard()), update, &mut |done, _| progress.at(done))?;
+    let mut done = |done, _| progress.at(done);
+    let report = if args.infer {
+        infer(&directory, update, &mut done)?
+    } else {
+        replay(&directory, Arc::new(Catalog::standard()), update, &mut done)?
+    };
     progress.finish();
     if args.json {
         super::print(&super::to_json(&report)?)?;
@@ -42,7 +51,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
                 format!("but at steps {}", steps.join(", "))
             }
         };
-        println!("{}: {} of {} steps run again, the same {words}", args.episode.display(), report.steps, report.budget);
+        let did = if args.infer { "inferred" } else { "run" };
+        println!(
+            "{}: {} of {} steps {did} again, the same {words}",
+            args.episode.display(),
+            report.steps,
+            report.budget
+        );
     }
     Ok(report.verdict()?)
 }

@@ -6,7 +6,9 @@ use super::progress::Progress;
 use crate::driver::{Driver, belief_update, default_out};
 use nudge_core::Error;
 use nudge_core::camera::NoiseModel;
-use nudge_core::episode::{DirectoryState, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepRecord};
+use nudge_core::episode::{
+    DirectoryState, Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Overwrite, StepOutcome, StepRecord,
+};
 use nudge_core::plan::{Action, PolicyKind};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
 use std::path::{Path, PathBuf};
@@ -43,6 +45,15 @@ pub struct Args {
     /// Go on with the episode that is in the directory
     #[arg(long)]
     resume: bool,
+    /// With --resume: repeat what was done so far and verify every step, instead of going on from the last checkpoint
+    #[arg(long, requires = "resume")]
+    verify: bool,
+    /// File what the camera gave and what the arm swept in every step (the default), for `nudge replay --infer`
+    #[arg(long, conflicts_with = "no_frames")]
+    frames: bool,
+    /// Do not file frames
+    #[arg(long)]
+    no_frames: bool,
     /// Print episode.json instead of the table
     #[arg(long)]
     json: bool,
@@ -105,7 +116,7 @@ fn beside_of(out: &Path, policy: PolicyKind) -> PathBuf {
     out.with_file_name(format!("{name}-{policy}"))
 }
 
-/// Begins an episode, or repeats the log of the one that is there and is to be resumed.
+/// Begins an episode, or goes on with the one that is there and is to be resumed.
 fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, out: &Path) -> anyhow::Result<Driver> {
     let update = belief_update(args.planning.belief.as_deref(), policy)?;
     let config = EpisodeConfig {
@@ -119,15 +130,21 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
     };
     if !(args.resume && EpisodeDir::state(out)? == DirectoryState::Episode) {
         let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
-        return Ok(Driver::start(scene, catalog, config, update, out, overwrite)?);
+        let frames = if args.no_frames && !args.frames { Frames::Left } else { Frames::Filed };
+        return Ok(Driver::start_filing(scene, catalog, config, update, out, overwrite, frames)?);
     }
     let logged = EpisodeDir::open(out)?.record()?;
     same_episode(&logged, &scene, &config, out)?;
     let progress = Progress::new("repeating", logged.steps.len());
-    let driver = Driver::resume(out, catalog, update, &mut |episode, _| {
+    let mut watch = |episode: &Episode, _: Option<&StepOutcome>| {
         progress.at(episode.record().steps.len());
         Ok(())
-    })?;
+    };
+    let driver = if args.verify {
+        Driver::resume(out, catalog, update, &mut watch)?
+    } else {
+        Driver::go_on(out, catalog, update, &mut watch)?
+    };
     progress.finish();
     Ok(driver)
 }

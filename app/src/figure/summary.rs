@@ -6,7 +6,7 @@ use super::{PIXELS_PER_UNIT, nice_ticks};
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture::{self, CellError, RgbImage, View};
 use nudge_core::belief::Belief;
-use nudge_core::episode::EpisodeRecord;
+use nudge_core::episode::{EpisodeRecord, NO_TRUTH};
 use nudge_core::plan::Action;
 use nudge_core::scene::{Body, Catalog, ClassId};
 use nudge_core::score::{Scores, Verdict};
@@ -21,8 +21,8 @@ pub struct Moment<'a> {
     pub step: usize,
     /// What is believed.
     pub belief: &'a Belief,
-    /// What is.
-    pub truth: &'a TruthMap,
+    /// What is, if that is known.
+    pub truth: Option<&'a TruthMap>,
 }
 
 /// What the figure of an episode is made from.
@@ -63,7 +63,7 @@ fn draw(summary: &Summary<'_>) -> Svg {
     let [w, d, _] = summary.record.scene.shelf.size;
     let map = [map_width, (map_width * d / w).min(1.2 * map_width)];
     let maps_top = 72.0;
-    let maps_height = 3.0 * (TITLE_HEIGHT + map[1]);
+    let maps_height = map_rows(summary) as f32 * (TITLE_HEIGHT + map[1]);
     let legend = class_legend(summary, WIDTH - 2.0 * MARGIN);
     let pictures_height = pictures_height(summary);
     let legend_top = maps_top + maps_height.max(pictures_height) + 20.0;
@@ -87,8 +87,10 @@ fn title(svg: &mut Svg, summary: &Summary<'_>) {
         format!("seed {}", record.config.seed),
         format!("{}, {}", count(record.steps.len(), "action"), count(pushes, "push")),
     ];
-    if let Some(last) = record.steps.last() {
-        let of = |verdict: Verdict| last.objects.iter().filter(|object| object.verdict == verdict).count();
+    if !record.has_truth() {
+        facts.push(NO_TRUTH.to_owned());
+    } else if let Some(last) = record.steps.last() {
+        let of = |verdict: Verdict| last.objects().iter().filter(|object| object.verdict == verdict).count();
         facts.push(format!(
             "{}: {} found, {} misclassified, {} not found, {} hallucinated",
             count(record.scene.objects.len(), "object"),
@@ -173,27 +175,34 @@ fn push_arrows(svg: &mut Svg, summary: &Summary<'_>, [left, top]: [f32; 2], heig
     }
 }
 
+/// Number of rows of maps: without a truth there is no error to show.
+fn map_rows(summary: &Summary<'_>) -> usize {
+    if summary.record.has_truth() { 3 } else { 2 }
+}
+
 /// Rows of semantic belief, entropy and error; a column for each moment.
 fn maps(svg: &mut Svg, summary: &Summary<'_>, [left, top]: [f32; 2], map: [f32; 2], columns: f32) {
-    let rows = ["Semantic belief", "Entropy", "Semantic error"];
+    let rows = &["Semantic belief", "Entropy", "Semantic error"][..map_rows(summary)];
     let legend = left + columns * (map[0] + GAP);
-    for (row, name) in rows.into_iter().enumerate() {
+    for (row, name) in rows.iter().copied().enumerate() {
         let title = top + row as f32 * (TITLE_HEIGHT + map[1]);
         let y = title + TITLE_HEIGHT;
         svg.text(&Text::new(name, [left, y - TITLE_DROP], 13.0));
         for (column, moment) in summary.moments.iter().take(3).enumerate() {
             let x = left + column as f32 * (map[0] + GAP);
-            let raster = match row {
-                0 => picture::paint_semantics(moment.belief, summary.catalog),
-                1 => picture::paint_entropy(moment.belief),
-                _ => picture::paint_errors(moment.belief, moment.truth),
+            let raster = match (row, moment.truth) {
+                (0, _) => picture::paint_semantics(moment.belief, summary.catalog),
+                (2.., Some(truth)) => picture::paint_errors(moment.belief, truth),
+                _ => picture::paint_entropy(moment.belief),
             };
             svg.raster([x, y], map, &raster, RasterStyle::Cells);
             // Dark lines, with a light rim where the map itself can be dark.
-            if row == 1 {
-                outline(svg, moment.truth, [x, y], map, Stroke::new([255; 3], 2.2).faint(0.5));
+            if let Some(truth) = moment.truth {
+                if row == 1 {
+                    outline(svg, truth, [x, y], map, Stroke::new([255; 3], 2.2).faint(0.5));
+                }
+                outline(svg, truth, [x, y], map, Stroke::new(INK, 0.9).faint(0.85));
             }
-            outline(svg, moment.truth, [x, y], map, Stroke::new(INK, 0.9).faint(0.85));
             svg.frame([x, y], map, Stroke::new(SOFT_INK, 0.7));
             if row == 0 {
                 let at = [x + map[0], y - TITLE_DROP];
@@ -312,25 +321,27 @@ fn push_steps(record: &EpisodeRecord) -> Vec<usize> {
     record.steps.iter().filter(|step| pushed(&step.action)).map(|step| step.index).collect()
 }
 
-fn scores_of(record: &EpisodeRecord) -> Vec<Scores> {
-    std::iter::once(record.prior).chain(record.steps.iter().map(|step| step.scores)).collect()
+/// What a curve shows of an episode after a number of actions, if it is known.
+type Value<'a> = &'a dyn Fn(&EpisodeRecord, usize) -> Option<f64>;
+
+fn values(record: &EpisodeRecord, value: Value<'_>) -> Vec<f64> {
+    (0..=record.steps.len()).filter_map(|step| value(record, step)).collect()
 }
 
-/// The curves of occupancy IoU, semantic mIoU and entropy.
+/// The curves of occupancy IoU, semantic mIoU and entropy; without a truth that of entropy alone.
 fn plots(svg: &mut Svg, summary: &Summary<'_>, top: f32) {
     let record = summary.record;
-    let scores = scores_of(record);
-    let beside = summary.beside.map(|other| (other.config.policy.name(), scores_of(other)));
+    let beside = summary.beside.map(|other| (other.config.policy.name(), other));
     let steps = summary.beside.map_or(0, |other| other.steps.len()).max(record.steps.len());
     // The episode itself, and the one beside it: the same colour, paler and dashed.
-    let curves = |name: &str, rgb: Rgb, value: &dyn Fn(&Scores) -> f64| -> Vec<Curve> {
+    let curves = |name: &str, rgb: Rgb, value: Value| -> Vec<Curve> {
         let own = if beside.is_some() { record.config.policy.name() } else { name };
-        let mine = Curve { name: own.to_owned(), rgb, dash: [0.0; 2], values: scores.iter().map(value).collect() };
-        let other = beside.as_ref().map(|(policy, scores)| Curve {
+        let mine = Curve { name: own.to_owned(), rgb, dash: [0.0; 2], values: values(record, value) };
+        let other = beside.as_ref().map(|(policy, other)| Curve {
             name: (*policy).to_owned(),
             rgb: colors::mix(rgb, [255; 3], 0.35),
             dash: [5.0, 3.0],
-            values: scores.iter().map(value).collect(),
+            values: values(other, value),
         });
         std::iter::once(mine).chain(other).collect()
     };
@@ -344,16 +355,23 @@ fn plots(svg: &mut Svg, summary: &Summary<'_>, top: f32) {
         pushes: pushes.clone(),
         marked: marked.clone(),
     };
-    let most = scores.iter().map(|s| s.entropy_nats).fold(1.0, f64::max) / 1e3;
-    let mut occupancy = curves("mean", [31, 90, 150], &|s| s.occupancy_iou);
+    let most = (0..=record.steps.len()).map(|step| record.entropy_after(step)).fold(1.0, f64::max) / 1e3;
+    let score = |value: fn(&Scores) -> f64| -> Box<dyn Fn(&EpisodeRecord, usize) -> Option<f64>> {
+        Box::new(move |record, step| record.scores_after(step).map(value))
+    };
+    let mut occupancy = curves("mean", [31, 90, 150], &score(|s| s.occupancy_iou));
     if beside.is_none() {
-        occupancy.extend(curves("occupied", [110, 168, 214], &|s| s.occupied_iou));
+        occupancy.extend(curves("occupied", [110, 168, 214], &score(|s| s.occupied_iou)));
     }
-    let plots = [
+    let entropy = curves("", [140, 41, 129], &|record, step| Some(record.entropy_after(step) / 1e3));
+    let mut plots = vec![
         plot("Occupancy IoU", occupancy, [0.0, 1.0]),
-        plot("Semantic mIoU", curves("", [20, 120, 90], &|s| s.semantic_miou), [0.0, 1.0]),
-        plot("Map entropy, thousand nats", curves("", [140, 41, 129], &|s| s.entropy_nats / 1e3), [0.0, most * 1.02]),
+        plot("Semantic mIoU", curves("", [20, 120, 90], &score(|s| s.semantic_miou)), [0.0, 1.0]),
+        plot("Map entropy, thousand nats", entropy, [0.0, most * 1.02]),
     ];
+    if !record.has_truth() {
+        plots.drain(..2);
+    }
     let width = (WIDTH - 2.0 * MARGIN - 2.0 * 24.0) / 3.0;
     for (at, plot) in plots.iter().enumerate() {
         plot.draw(svg, [MARGIN + at as f32 * (width + 24.0), top], [width, PLOT_HEIGHT]);
@@ -374,7 +392,7 @@ mod tests {
     fn the_figure_of_an_episode_is_drawn() {
         let played = fixture::play(12);
         let moments =
-            [1, 6, 12].map(|step| Moment { step, belief: &played.beliefs[step], truth: &played.truths[step] });
+            [1, 6, 12].map(|step| Moment { step, belief: &played.beliefs[step], truth: Some(&played.truths[step]) });
         let summary_of = Summary {
             record: &played.record,
             catalog: &played.catalog,
@@ -400,5 +418,11 @@ mod tests {
         empty.steps.clear();
         let prior = [Moment { step: 0, ..moments[0] }];
         summary(&Summary { record: &empty, moments: &prior, ..summary_of }).expect("drawn");
+        // One without a truth shows the rest and says so once.
+        let untold = fixture::without_truth(&played.record);
+        let blind = moments.map(|moment| Moment { truth: None, ..moment });
+        let drawn = draw(&Summary { record: &untold, moments: &blind, start: &[], ..summary_of }).document();
+        assert_eq!(drawn.matches("no ground truth").count(), 1);
+        assert!(!drawn.contains("mIoU") && drawn.contains("Map entropy") && !drawn.contains("Semantic error"));
     }
 }

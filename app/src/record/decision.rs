@@ -2,9 +2,9 @@
 
 use super::Setting;
 use nudge_core::episode::StepRecord;
-use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, Reason};
+use nudge_core::plan::{Action, CandidateRecord, Comparison, Decision, Term, TermKind, Winner};
 use nudge_core::score::Scores;
-use nudge_core::skill::{Manipulation, Rejection, SkillKind};
+use nudge_core::skill::{Manipulation, Rejection, SkillKind, Unit};
 use std::fmt::Write as _;
 
 /// One score over the steps.
@@ -20,6 +20,13 @@ pub struct Series {
     pub rgb: [u8; 3],
     /// Its value.
     pub value: fn(&Scores) -> f64,
+}
+
+impl Series {
+    /// Its value in a state; without a truth there is the entropy alone.
+    pub fn at(&self, scores: Option<&Scores>, entropy_nats: f64) -> Option<f64> {
+        scores.map(self.value).or_else(|| (self.key == "entropy_nats").then_some(entropy_nats))
+    }
 }
 
 /// The scores that are recorded.
@@ -71,14 +78,13 @@ pub const SERIES: &[Series] = &[
 /// How many views and pushes the tables list.
 const LISTED: usize = 5;
 
-/// The scores in one line.
-pub fn scores_line(scores: &Scores) -> String {
-    format!(
-        "IoU {:.3}, mIoU {:.3}, entropy {} nats",
-        scores.occupancy_iou,
-        scores.semantic_miou,
-        thousands(scores.entropy_nats)
-    )
+/// The scores in one line; without a truth the entropy alone.
+pub fn scores_line(scores: Option<&Scores>, entropy_nats: f64) -> String {
+    let entropy = format!("entropy {} nats", thousands(entropy_nats));
+    match scores {
+        Some(scores) => format!("IoU {:.3}, mIoU {:.3}, {entropy}", scores.occupancy_iou, scores.semantic_miou),
+        None => entropy,
+    }
 }
 
 /// A step in one line.
@@ -87,14 +93,14 @@ pub fn line(record: &StepRecord) -> String {
         "step {}: {} ({}); {}",
         record.index,
         action(&record.action),
-        reason(record.decision.reason),
-        scores_line(&record.scores)
+        record.decision.reason.words(),
+        scores_line(record.scores(), record.entropy_nats)
     )
 }
 
 /// What went wrong in a step, one line each.
 pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
-    let mut words: Vec<String> = record.dropped.iter().map(|name| format!("dropped {name}")).collect();
+    let mut words: Vec<String> = record.dropped().iter().map(|name| format!("dropped {name}")).collect();
     if let Some(push) = &record.push {
         if push.stalled {
             let name = manipulated(record).map_or("way", |manipulation| manipulation.kind().name());
@@ -131,25 +137,6 @@ pub(crate) fn action(action: &Action) -> String {
     }
 }
 
-/// A reason in words.
-pub(crate) fn reason(reason: Reason) -> &'static str {
-    match reason {
-        Reason::LookTellsMore => "looking tells more",
-        Reason::PushTellsLittle => "no push promises enough",
-        Reason::PushTellsMore => "pushing tells more",
-        Reason::PushReveals => "the push really brings something hidden into sight",
-        Reason::ViewOfPush => "the view that made the push worth it",
-        Reason::TooEarly => "no push in the first steps",
-        Reason::LastStep => "no push in the last steps",
-        Reason::JustPushed => "no push soon after a push",
-        Reason::MapComplete => "the map is complete",
-        Reason::Dropped => "an object was dropped, so no more pushes",
-        Reason::NoCandidate => "no feasible push",
-        Reason::Schedule => "the policy's schedule",
-        Reason::Manual => "chosen by hand",
-    }
-}
-
 /// The decision of a step as a page.
 pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     let decision = &record.decision;
@@ -158,14 +145,18 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
         record.index,
         setting.budget,
         action(&record.action),
-        capital(reason(decision.reason))
+        capital(&decision.comparison().because)
     );
-    weighed(&mut page, decision, setting);
+    weighed(&mut page, &decision.comparison());
     views(&mut page, setting, decision);
     for kind in SkillKind::ALL {
-        manipulations(&mut page, decision, *kind, setting.planner.gamma);
+        manipulations(&mut page, decision, *kind);
     }
-    let scores = &record.scores;
+    let Some(scores) = record.scores() else {
+        let entropy = thousands(record.entropy_nats);
+        let _ = write!(page, "**After the step**\n\n| entropy, nats |\n|--:|\n| {entropy} |\n");
+        return page;
+    };
     let _ = write!(
         page,
         "**After the step**\n\n| occupancy IoU | occupied IoU | semantic mIoU | entropy, nats |\n|--:|--:|--:|--:|\n\
@@ -178,21 +169,20 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     page
 }
 
-fn weighed(page: &mut String, decision: &Decision, setting: &Setting<'_>) {
-    let PlannerSettings { counted, gamma, .. } = *setting.planner;
-    let sign = |holds: bool| if holds { " ◀" } else { "" };
-    let push = decision.igm + gamma * decision.reg;
-    let (looks, pushed) = (matches!(decision.action, Action::Look { .. }), decision.best_push.is_some());
+fn weighed(page: &mut String, comparison: &Comparison) {
+    let sign = |winner: Winner| if comparison.winner == winner { " ◀" } else { "" };
     page.push_str("| weighed | nats |\n|:--|--:|\n");
-    let _ = writeln!(page, "| look: IGV, {}{} | {:.1} |", counted.of_looks(), sign(looks), decision.igv);
-    if pushed {
-        let asked = setting.planner.asked_of_pushes(decision.igv);
-        if asked != decision.igv {
-            let _ = writeln!(page, "|    what a push has to promise | {asked:.1} |");
+    for Term { kind, nats, words, .. } in &comparison.terms {
+        let row = match kind {
+            TermKind::Look => format!("look: IGV, {words}{}", sign(Winner::Look)),
+            TermKind::Threshold => format!("   what a push has to promise: {words}"),
+            TermKind::Push => format!("   IGM, {words}"),
+            TermKind::Disturbance => format!("   γ·Reg, {words}"),
+        };
+        if let (TermKind::Push, Some(pushing)) = (kind, comparison.pushing) {
+            let _ = writeln!(page, "| push: IGM + γ·Reg{} | {pushing:.1} |", sign(Winner::Push));
         }
-        let _ = writeln!(page, "| push: IGM + γ·Reg{} | {push:.1} |", sign(!looks));
-        let _ = writeln!(page, "|    IGM, {} | {:.1} |", counted.of_pushes(), decision.igm);
-        let _ = writeln!(page, "|    γ·Reg, what it would blur | {:.1} |", gamma * decision.reg);
+        let _ = writeln!(page, "| {row} | {nats:.1} |");
     }
     page.push('\n');
 }
@@ -217,49 +207,54 @@ fn views(page: &mut String, setting: &Setting<'_>, decision: &Decision) {
 }
 
 /// The candidates of a skill.
-fn manipulations(page: &mut String, decision: &Decision, kind: SkillKind, gamma: f32) {
-    let all = || decision.candidates.iter().enumerate().filter(move |(_, c)| c.manipulation.kind() == kind);
-    if all().next().is_none() {
+fn manipulations(page: &mut String, decision: &Decision, kind: SkillKind) {
+    let ranked = decision.ranked_candidates().into_iter().map(|at| (at, &decision.candidates[at]));
+    let all: Vec<(usize, &CandidateRecord)> = ranked.filter(|(_, c)| c.manipulation.kind() == kind).collect();
+    if all.is_empty() {
         return;
     }
-    let value = |c: &CandidateRecord| c.gain.map(|gain| gain + gamma * c.reg.unwrap_or(0.0));
-    let mut feasible: Vec<(usize, f32, &CandidateRecord)> =
-        all().filter_map(|(at, c)| Some((at, value(c)?, c))).collect();
-    feasible.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let count = |is: fn(&Rejection) -> bool| all().filter(|(_, c)| c.rejection.as_ref().is_some_and(is)).count();
+    let feasible: Vec<_> = all.iter().filter(|(_, c)| c.rejection.is_none()).collect();
+    let count = |is: fn(&Rejection) -> bool| all.iter().filter(|(_, c)| c.rejection.as_ref().is_some_and(is)).count();
     let _ = write!(
         page,
         "**{}**: {} drawn, {} feasible; {} without a target, {} out of reach, {} blocked, {} without a free way\n\n",
         capital(kind.plural()),
-        all().count(),
+        all.len(),
         feasible.len(),
         count(|r| matches!(r, Rejection::NoTarget)),
         count(|r| matches!(r, Rejection::Unreachable { .. })),
         count(|r| matches!(r, Rejection::ArmBlocked { .. })),
         count(|r| matches!(r, Rejection::NoWay)),
     );
-    let rejections = all().filter_map(|(_, c)| c.rejection.as_ref().map(|rejection| rejection.kind_words(kind)));
-    reasons(page, rejections);
-    let Some((_, _, first)) = feasible.first() else { return };
-    let mut numbers = String::new();
+    reasons(page, all.iter().filter_map(|(_, c)| c.rejection.as_ref().map(|rejection| rejection.kind_words(kind))));
+    let Some((_, first)) = feasible.first() else { return };
+    let (mut numbers, mut lines) = (String::new(), String::new());
     for parameter in &first.manipulation.describe().parameters {
-        let _ = write!(numbers, " {}, {} |", parameter.name, parameter.sign());
+        let unit = if parameter.unit == Unit::Metres { " (m)" } else { "" };
+        let _ = write!(numbers, " {}{unit} |", parameter.name);
+        lines.push_str("--:|");
     }
-    let lines = "--:|".repeat(numbers.matches('|').count());
     let name = kind.name();
     let _ = write!(page, "| {name} |{numbers} arm | gain | Reg | value, nats |\n|--:|{lines}--:|--:|--:|--:|\n");
-    for (at, value, c) in feasible.iter().take(LISTED) {
+    let nats = |value: Option<f32>| value.map_or("–".to_owned(), |value| format!("{value:.1}"));
+    for (at, c) in feasible.iter().take(LISTED) {
         let best = if decision.best_push == Some(*at) { " ●" } else { "" };
         let _ = write!(page, "| {at}{best} |");
         for parameter in c.manipulation.describe().parameters {
-            let _ = write!(page, " {} |", parameter.number());
+            let unit = match parameter.unit {
+                Unit::Metres => "",
+                Unit::Millimetres => " mm",
+                Unit::Degrees => "°",
+            };
+            let _ = write!(page, " {}{unit} |", parameter.number());
         }
         let _ = writeln!(
             page,
-            " {:.1} s | {:.1} | {:.1} | {value:.1} |",
+            " {:.1} s | {} | {} | {} |",
             c.motion_s.unwrap_or(0.0),
-            c.gain.unwrap_or(0.0),
-            c.reg.unwrap_or(0.0)
+            nats(c.gain),
+            nats(c.reg),
+            nats(decision.value_of(c))
         );
     }
     page.push('\n');
@@ -303,38 +298,44 @@ mod tests {
     use crate::fixture;
     use nudge_core::arm::ArmTool;
     use nudge_core::episode::PushReport;
+    use nudge_core::plan::{PlannerSettings, PolicyKind, Reason, Rule};
     use nudge_core::skill::Push;
 
     #[test]
-    fn the_page_of_a_push_shows_what_it_had_to_promise() {
+    fn the_page_of_a_push_shows_what_it_had_to_promise_and_lists_the_best_push_first() {
         let played = fixture::play(4);
-        let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 };
         let (mut record, arm) = (played.record.steps[3].clone(), ArmTool::standard(played.record.scene.shelf));
-        record.decision = Decision {
-            action: Action::Manipulate(push.into()),
-            reason: Reason::PushTellsMore,
-            igv: 30.0,
-            igm: 400.0,
-            reg: -50.0,
-            best_push: Some(0),
-            ..record.decision
-        };
-        let page = |planner: &PlannerSettings| {
+        let push = |length_m| Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m };
+        let weighed = |gain, length_m| CandidateRecord { gain: Some(gain), ..CandidateRecord::of(push(length_m)) };
+        let mut page = |settings: PlannerSettings| {
+            record.decision = Decision {
+                igv: 30.0,
+                igm: 400.0,
+                reg: -50.0,
+                candidates: vec![weighed(500.0, 0.11), weighed(400.0, 0.12), weighed(600.0, 0.13)],
+                best_push: Some(1),
+                rule: Some(Rule { policy: PolicyKind::Mem, settings }),
+                ..Decision::unweighed(Action::Manipulate(push(0.12).into()), Reason::PushTellsMore)
+            };
             let setting = Setting {
                 shelf: &played.record.scene.shelf,
                 catalog: &played.catalog,
                 views: &played.views,
                 budget: 4,
-                planner,
+                planner: &PlannerSettings::default(),
                 arm: &arm,
                 unreachable: &[],
             };
             markdown(&setting, &record)
         };
-        let patient = PlannerSettings { patience: 10.0, push_floor: 50.0, ..PlannerSettings::default() };
-        let with = page(&patient);
-        assert!(with.contains("what a push has to promise | 300.0 |") && with.contains("γ·Reg ◀ | 390.0 |"), "{with}");
-        assert!(!page(&PlannerSettings::default()).contains("has to promise"), "the paper's rule compares IGV itself");
+        let with = page(PlannerSettings { patience: 10.0, push_floor: 50.0, ..PlannerSettings::default() });
+        assert!(with.contains("what a push has to promise: ") && with.contains("(patience) | 300.0 |"), "{with}");
+        assert!(with.contains("γ·Reg ◀ | 390.0 |"), "{with}");
+        let rows: Vec<&str> = with.lines().filter(|line| line.contains(" mm | ")).collect();
+        let lengths = |row: &&str| ["110", "120", "130"].iter().position(|mm| row.contains(&format!("{mm} mm")));
+        assert_eq!(rows.iter().filter_map(lengths).collect::<Vec<_>>(), [1, 2, 0], "{with}");
+        assert!(rows[0].starts_with("| 1 ● |"), "{with}");
+        assert!(!page(PlannerSettings::default()).contains("has to promise"), "the paper's rule compares IGV itself");
     }
 
     #[test]
@@ -351,10 +352,10 @@ mod tests {
             ),
         ];
         let mut page = String::new();
-        SkillKind::ALL.iter().for_each(|kind| manipulations(&mut page, &decision, *kind, 0.2));
+        SkillKind::ALL.iter().for_each(|kind| manipulations(&mut page, &decision, *kind));
         assert!(page.contains("**Pushes**: 1 drawn") && page.contains("**Drags**: 1 drawn"), "{page}");
-        assert!(page.contains("| 1 | 0.00 | 0.20 | 0.05 | -90 | 80 | 45 |"), "{page}");
-        assert!(page.contains("| 0 | 0.00 | 0.10 | 0.06 | 90 | 100 | 0.0 s |"), "{page}");
+        assert!(page.contains("| 0.00 | 0.20 | 0.05 | -90° | 80 mm | 45° |"), "{page}");
+        assert!(page.contains("| 0.00 | 0.10 | 0.06 | 90° | 100 mm | 0.0 s |"), "{page}");
     }
 
     #[test]

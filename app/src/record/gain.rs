@@ -4,8 +4,8 @@ use super::{Setting, shapes};
 use crate::record::decision::{length, thousands};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::StepOutcome;
-use nudge_core::gain::{GainField, RayDensity};
-use nudge_core::plan::{Action, Counted, gain_sources, push_sources};
+use nudge_core::gain::RayDensity;
+use nudge_core::plan::{self, Action};
 use nudge_core::scene::Shelf;
 
 /// How far the label hangs above the shelf, metres.
@@ -33,14 +33,14 @@ impl Gain {
     }
 }
 
-/// The gain of a step's action under the belief before it: what the view gains, or what the push is worth by the planner's
+/// The gain of a step's action, by what gains were before it: what the view gains, or what the push is worth by the planner's
 /// own measure under the prediction that changed the belief. `None` where the action promised nothing or was not weighed.
-pub fn of(setting: &Setting<'_>, field: &GainField, outcome: &StepOutcome) -> Option<Gain> {
+pub fn of(setting: &Setting<'_>, gain: &plan::Gain, outcome: &StepOutcome) -> Option<Gain> {
     let record = &outcome.record;
     let done = match record.action {
         Action::Manipulate(manipulation) => manipulation,
         Action::Look { view } => {
-            let nats = gain_sources(field, setting.views, view, RayDensity::FULL);
+            let nats = gain.per_voxel(setting.views, view, RayDensity::FULL);
             return Gain::new(&format!("Gain of the look from view {}", view.0), nats);
         }
     };
@@ -48,14 +48,8 @@ pub fn of(setting: &Setting<'_>, field: &GainField, outcome: &StepOutcome) -> Op
     let offered: Vec<ViewId> = setting.views.views.iter().map(|view| view.id).collect();
     let offered: Vec<ViewId> = offered.into_iter().filter(|view| !setting.unreachable.contains(view)).collect();
     let best = record.decision.candidates.iter().find(|candidate| candidate.manipulation == done)?.view;
-    let counted = setting.planner.counted;
-    let nats = push_sources(counted, field, setting.views, &offered, prediction, best);
-    let what = match (counted, best) {
-        (Counted::All, Some(best)) => format!("the best view after it, view {}", best.0),
-        (Counted::All, None) => return None,
-        (Counted::Unseen, _) => "what it opens to all views together".to_owned(),
-    };
+    let sources = gain.push_sources(setting.views, &offered, prediction, best)?;
     let stalled = record.push.as_ref().is_some_and(|report| report.stalled);
     let far = if stalled { format!(", as far as it went ({})", length(record)?) } else { String::new() };
-    Gain::new(&format!("Worth of the {}{far}, {what}", done.kind().name()), nats)
+    Gain::new(&format!("Worth of the {}{far}, {}", done.kind().name(), sources.words), sources.nats)
 }

@@ -1,7 +1,7 @@
 //! Bodies, cameras and pushes as meshes, lines, images and arrows.
 
 use crate::colors::{self, Colormap, Rgb};
-use nudge_core::camera::{Image, Intrinsics, View, ViewArray};
+use nudge_core::camera::{Frame, Intrinsics, Pinhole, View, ViewArray};
 use nudge_core::plan::Decision;
 use nudge_core::scene::{Body, Catalog, Shelf};
 use nudge_core::skill::{Arrow, Manipulation};
@@ -139,10 +139,16 @@ pub fn frusta_colors(gains: &[f32], range: [f32; 2]) -> rerun::LineStrips3D {
 }
 
 /// The camera that took an image, at the size that images are recorded.
-pub fn pinhole(intrinsics: &Intrinsics) -> rerun::Pinhole {
+pub fn pinhole(intrinsics: &Pinhole) -> rerun::Pinhole {
     let size = thinned_size([intrinsics.width, intrinsics.height]).map(|n| n as f32);
-    let focal = intrinsics.focal_px / IMAGE_STEP as f32;
-    rerun::Pinhole::from_focal_length_and_resolution([focal, focal], size)
+    let focal = intrinsics.focal_px.map(|px| px / IMAGE_STEP as f32);
+    let camera = rerun::Pinhole::from_focal_length_and_resolution(focal, size);
+    let camera = if intrinsics.principal_px == [0.5 * intrinsics.width as f32, 0.5 * intrinsics.height as f32] {
+        camera
+    } else {
+        camera.with_principal_point(intrinsics.principal_px.map(|px| px / IMAGE_STEP as f32))
+    };
+    camera
         .with_image_plane_distance(0.10)
         .with_color(rerun::Color::from(CHOSEN_RGB))
         .with_line_width(rerun::Radius::new_ui_points(1.6))
@@ -159,15 +165,15 @@ fn thinned_size(size: [usize; 2]) -> [u32; 2] {
 }
 
 /// Depth in millimetres, 16 bit, as a PNG.
-pub fn depth_image(image: &Image, intrinsics: &Intrinsics) -> rerun::EncodedDepthImage {
-    let [width, height] = thinned_size(image.size);
-    let millimetres: Vec<u16> = thinned(&image.depth_m, image.size).map(|m| (m * 1e3).round() as u16).collect();
+pub fn depth_image(frame: &Frame) -> rerun::EncodedDepthImage {
+    let [width, height] = thinned_size(frame.size());
+    let millimetres: Vec<u16> = thinned(frame.depth_m(), frame.size()).map(|m| (m * 1e3).round() as u16).collect();
     let mut png = std::io::Cursor::new(Vec::new());
     image::ImageBuffer::<image::Luma<u16>, _>::from_raw(width, height, millimetres)
         .expect("one value a pixel")
         .write_to(&mut png, image::ImageFormat::Png)
         .expect("a PNG in memory cannot fail");
-    let [near, far] = intrinsics.depth_range_m.map(f64::from);
+    let [near, far] = frame.intrinsics().depth_range_m.map(f64::from);
     rerun::EncodedDepthImage::new(png.into_inner())
         .with_media_type(rerun::components::MediaType::PNG)
         .with_meter(1000.0)
@@ -176,9 +182,9 @@ pub fn depth_image(image: &Image, intrinsics: &Intrinsics) -> rerun::EncodedDept
 }
 
 /// The class of every pixel.
-pub fn label_image(image: &Image) -> rerun::SegmentationImage {
-    let labels: Vec<u8> = thinned(&image.labels, image.size).collect();
-    segmentation(labels, thinned_size(image.size))
+pub fn label_image(frame: &Frame) -> rerun::SegmentationImage {
+    let labels: Vec<u8> = thinned(&frame.labels(), frame.size()).collect();
+    segmentation(labels, thinned_size(frame.size()))
 }
 
 /// Class ids as an image.
@@ -188,9 +194,8 @@ pub fn segmentation(labels: Vec<u8>, size: [u32; 2]) -> rerun::SegmentationImage
 }
 
 /// The candidates as arrows, one each: feasible ones by value in the colours of the gain, rejected ones thin and grey.
-pub fn candidates(decision: &Decision, gamma: f32) -> rerun::Arrows3D {
-    let value = |gain: Option<f32>, reg: Option<f32>| gain.map(|gain| gain + gamma * reg.unwrap_or(0.0));
-    let values: Vec<Option<f32>> = decision.candidates.iter().map(|c| value(c.gain, c.reg)).collect();
+pub fn candidates(decision: &Decision) -> rerun::Arrows3D {
+    let values: Vec<Option<f32>> = decision.candidates.iter().map(|c| decision.value_of(c)).collect();
     let best = values.iter().flatten().copied().fold(f32::MIN_POSITIVE, f32::max);
     let worst = values.iter().flatten().copied().fold(best, f32::min);
     let arrows: Vec<Arrow> = decision.candidates.iter().map(|candidate| candidate.manipulation.arrow()).collect();

@@ -2,7 +2,8 @@ use super::*;
 use crate::fixture;
 use nudge_core::arm::ArmTool;
 use nudge_core::gain::{Openings, RayDensity};
-use nudge_core::plan::Counted;
+use nudge_core::grid::VoxelSet;
+use nudge_core::plan::{self, Counted};
 
 /// Where a test keeps its output: `NUDGE_KEEP` if that is set, else a directory that goes with the guard.
 fn output() -> (PathBuf, Option<tempfile::TempDir>) {
@@ -34,14 +35,15 @@ fn a_recording_stays_small_and_names_its_entities() {
     let mut recorder = Recorder::begin(&path, "test", &setting).expect("file");
     let mut sizes = Vec::new();
     for step in 0..=steps {
-        let scores = step.checked_sub(1).map_or(&played.record.prior, |at| &played.record.steps[at].scores);
+        let scores = played.record.scores_after(step);
         let state = State {
             step,
             bodies: &played.bodies[step],
             belief: &played.beliefs[step],
-            seen: None,
-            truth: &played.truths[step],
+            seen: &VoxelSet::empty(&played.beliefs[step].grid),
+            truth: Some(&played.truths[step]),
             scores,
+            entropy_nats: played.record.entropy_after(step),
         };
         recorder.state(&setting, &state).expect("state");
         if let Some(outcome) = step.checked_sub(1).map(|at| &played.outcomes[at]) {
@@ -111,6 +113,8 @@ fn a_pushs_gain_is_drawn_as_its_own_worth_and_not_as_that_of_the_view_after_it()
     let arm = ArmTool::standard(played.record.scene.shelf);
     let (outcome, before) = (&played.outcomes[3], &played.beliefs[3]);
     let Action::Manipulate(push) = outcome.record.action else { panic!("the fourth action is a push") };
+    let none = VoxelSet::empty(&before.grid);
+    let counting = |counted| plan::Gain::new(counted, before, &none);
     let drawn = |counted| {
         let setting = Setting {
             shelf: &played.record.scene.shelf,
@@ -121,10 +125,11 @@ fn a_pushs_gain_is_drawn_as_its_own_worth_and_not_as_that_of_the_view_after_it()
             arm: &arm,
             unreachable: &[],
         };
-        gain::of(&setting, &gain_field(before, None), outcome).expect("a gain")
+        gain::of(&setting, &counting(counted), outcome).expect("a gain")
     };
     let ids: Vec<ViewId> = played.views.views.iter().map(|view| view.id).step_by(5).collect();
-    let openings = Openings::new(&gain_field(before, None), &played.views, &ids, RayDensity::COARSE);
+    let unseen = counting(Counted::Unseen);
+    let openings = Openings::new(unseen.field(), &played.views, &ids, RayDensity::COARSE);
     let opened = openings.under_each(outcome.prediction.as_slice())[0];
     let gain = drawn(Counted::Unseen);
     let sum: f32 = gain.nats.iter().map(|(_, nats)| nats).sum();

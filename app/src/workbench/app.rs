@@ -3,6 +3,7 @@
 mod carry_out;
 mod draw;
 mod files;
+mod shown;
 mod take_in;
 #[cfg(test)]
 mod tests;
@@ -13,6 +14,7 @@ use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};
 use super::model::{GainSource, LayoutKind, Model, Picked, Preview, Remembered};
+use super::part::Part;
 use super::session::{Activity, SessionId};
 use super::space::{Drawn, Painter};
 use super::tasks::Tasks;
@@ -149,38 +151,6 @@ impl Background {
     }
 }
 
-/// A part of the window that can be exported as a picture of its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Part {
-    /// All of it.
-    #[default]
-    Window,
-    /// The three-dimensional views.
-    Space,
-    /// Floor maps and camera images.
-    Maps,
-    /// The score curves.
-    Curves,
-    /// The panel at the right.
-    Right,
-}
-
-impl Part {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Window, Self::Space, Self::Maps, Self::Curves, Self::Right];
-
-    /// As a choice names it.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Window => "the whole window",
-            Self::Space => "the three-dimensional views",
-            Self::Maps => "the floor maps and camera images",
-            Self::Curves => "the score curves",
-            Self::Right => "the panel at the right",
-        }
-    }
-}
-
 /// What a file dialog was opened for.
 #[derive(Clone, Copy)]
 enum ChosenFor {
@@ -226,6 +196,7 @@ struct Pair {
 pub struct App {
     /// What is shown.
     pub model: Model,
+    panels: shown::Panels,
     options: Options,
     catalog: Arc<Catalog>,
     workers: BTreeMap<SessionId, Worker>,
@@ -317,6 +288,7 @@ impl App {
                 browser: Browser::of(&options.scenes).and_shipped(options.shipped_scenes.clone()),
                 ..Model::default()
             },
+            panels: shown::Panels::default(),
             options,
             catalog: Arc::new(Catalog::standard()),
             workers: BTreeMap::new(),

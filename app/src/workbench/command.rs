@@ -2,6 +2,7 @@
 
 use super::model::{LayoutKind, Picked};
 use super::session::SessionId;
+pub use super::toasts::Level;
 use nudge_core::plan::{Action, Decision};
 use nudge_core::score::Verdict;
 use nudge_core::skill::Manipulation;
@@ -70,17 +71,6 @@ pub enum Command {
     Tell(Level, String),
     /// A decision that a test or a script made.
     Act(Arc<Decision>),
-}
-
-/// How much a message matters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Level {
-    /// Good to know.
-    Info,
-    /// Something is not as asked.
-    Warning,
-    /// Something failed.
-    Error,
 }
 
 /// The entries of the menus.

@@ -45,7 +45,7 @@ pub struct Derived {
     pub of: (SessionId, usize),
     /// The belief in full precision.
     pub belief: Arc<Belief>,
-    /// The floor maps, one pixel a cell, the back of the shelf on top.
+    /// The floor maps, one pixel a cell, the back of the shelf on top; without a truth those of the belief alone.
     pub maps: BTreeMap<MapKind, RgbImage>,
 }
 
@@ -53,16 +53,16 @@ impl Derived {
     /// Makes them; takes some tens of milliseconds.
     pub fn of(id: SessionId, moment: &Moment, catalog: &Catalog) -> Self {
         let belief = moment.belief.belief();
-        let truth = &moment.truth;
-        let maps = MapKind::ALL.into_iter().map(|kind| {
+        let truth = moment.truth.as_ref();
+        let maps = MapKind::ALL.into_iter().filter_map(|kind| {
             let map = match kind {
                 MapKind::Semantics => picture::paint_semantics(&belief, catalog),
                 MapKind::Certainty => picture::paint_certainty(&belief),
                 MapKind::Entropy => picture::paint_entropy(&belief),
-                MapKind::Truth => picture::paint_labels(&belief.grid, &truth.labels, catalog),
-                MapKind::Error => picture::paint_errors(&belief, truth),
+                MapKind::Truth => picture::paint_labels(&belief.grid, &truth?.labels, catalog),
+                MapKind::Error => picture::paint_errors(&belief, truth?),
             };
-            (kind, map)
+            Some((kind, map))
         });
         Self { of: (id, moment.step), maps: maps.collect(), belief: Arc::new(belief) }
     }

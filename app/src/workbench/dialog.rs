@@ -1,7 +1,7 @@
 //! Questions that the window asks in front of everything else.
 
-use super::app::Part;
 use super::command::MenuCommand;
+use super::part::Part;
 use super::session::SessionId;
 use std::path::{Path, PathBuf};
 

@@ -40,7 +40,7 @@ pub fn write_episode(session: &Session, into: &Path, watch: Watch<'_>) -> Result
         fs::remove_dir_all(&beside).map_err(|error| Error::io(&beside, error))?;
     }
     let record = record_of(session);
-    let states = session.moments.iter().map(|moment| (moment.belief.belief(), &*moment.truth));
+    let states = session.moments.iter().map(|moment| (moment.belief.belief(), moment.truth.as_deref()));
     let written = EpisodeDir::store(&beside, &record, states).and_then(|directory| {
         // The directory's lock has to go before the directory moves.
         drop(directory);
@@ -138,12 +138,13 @@ fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Wa
             step: moment.step,
             bodies: &moment.bodies,
             belief: &belief,
-            seen: moment.seen.as_deref(),
-            truth: &moment.truth,
-            scores: &moment.scores,
+            seen: &moment.seen,
+            truth: moment.truth.as_deref(),
+            scores: moment.scores.as_ref(),
+            entropy_nats: moment.entropy_nats,
         };
         recorder.record(&setting, &state, moment.outcome.as_deref())?;
-        let objects = moment.outcome.as_ref().map_or(&[][..], |outcome| &outcome.record.objects);
+        let objects = moment.outcome.as_ref().map_or(&[][..], |outcome| outcome.record.objects());
         let note = session.annotations.notes.get(&moment.step).map(String::as_str);
         recorder.remark(note, &session.annotations.judge(moment.step, objects))?;
     }
@@ -163,7 +164,7 @@ fn summary(session: &Session, record: &EpisodeRecord) -> Result<picture::RgbImag
     let columns: Vec<figure::Moment<'_>> = moments
         .iter()
         .zip(&beliefs)
-        .map(|(moment, belief)| figure::Moment { step: moment.step, belief, truth: &moment.truth })
+        .map(|(moment, belief)| figure::Moment { step: moment.step, belief, truth: moment.truth.as_deref() })
         .collect();
     figure::summary(&figure::Summary {
         record,

@@ -8,8 +8,9 @@ use nudge_core::belief::{BeliefUpdate, Classical};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
 use nudge_core::gain::RayDensity;
-use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, gain_field, gain_sources};
+use nudge_core::plan::{Action, Decision, Gain, PlannerSettings, PolicyKind, Reason};
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
+use nudge_core::skill::intended;
 use nudge_core::skill::intended;
 use nudge_core::world::TruthMap;
 use std::path::PathBuf;
@@ -71,7 +72,7 @@ impl Script {
             unreachable: Arc::new(episode.unreachable_views().to_vec()),
             hidden: Arc::new(vec!["tomato_can#1".to_owned()]),
         };
-        let mut truth = Arc::new(episode.truth().clone());
+        let mut truth = Arc::new(episode.truth().expect("a truth").clone());
         let mut moments = vec![moment(&episode, None, &mut truth)];
         for step in 1..=self.steps {
             let mut decision = episode.decide();
@@ -91,17 +92,19 @@ impl Script {
 }
 
 fn moment(episode: &Episode, outcome: Option<Arc<StepOutcome>>, truth: &mut Arc<TruthMap>) -> Arc<Moment> {
-    if **truth != *episode.truth() {
-        *truth = Arc::new(episode.truth().clone());
+    let now = episode.truth().expect("a truth");
+    if **truth != *now {
+        *truth = Arc::new(now.clone());
     }
     let record = episode.record();
     Arc::new(Moment {
         step: record.steps.len(),
         belief: HalfBelief::of(episode.belief()),
-        seen: episode.seen().cloned().map(Arc::new),
-        truth: truth.clone(),
+        seen: Arc::new(episode.seen().clone()),
+        truth: Some(truth.clone()),
         bodies: Arc::new(episode.bodies()),
-        scores: record.steps.last().map_or(record.prior, |step| step.scores),
+        scores: record.scores_after(record.steps.len()).copied(),
+        entropy_nats: record.entropy_after(record.steps.len()),
         outcome,
     })
 }
@@ -171,12 +174,8 @@ pub fn answer(model: &mut Model) {
         Preview { of: (session.id, step), manipulation, prediction: Arc::new(prediction), swept: Arc::new(told.swept) }
     });
     let source = model.view.map(|view| {
-        let nats = gain_sources(
-            &gain_field(&belief, session.moment(step).seen.as_deref()),
-            &session.setup.views,
-            view,
-            RayDensity::FULL,
-        );
+        let gain = Gain::new(session.record.config.planner.counted, &belief, &session.moment(step).seen);
+        let nats = gain.per_voxel(&session.setup.views, view, RayDensity::FULL);
         GainSource::new((session.id, step), view, nats)
     });
     model.preview = preview;

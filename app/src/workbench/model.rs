@@ -4,7 +4,7 @@
 use super::author::Author;
 use super::browser::Browser;
 use super::derive::Derived;
-use super::panels;
+pub use super::layout_kind::LayoutKind;
 use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
 use crate::driver::default_belief;
@@ -16,41 +16,6 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// The layouts, as the tabs at the top right name them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum LayoutKind {
-    /// Belief, maps, curves and decision.
-    #[default]
-    Episode,
-    /// The numbers and causes of one voxel or cell.
-    Why,
-    /// The gain of every view.
-    Gains,
-    /// What pushes would do.
-    Push,
-    /// Two episodes on one clock.
-    Compare,
-    /// A scene in the making.
-    Author,
-}
-
-impl LayoutKind {
-    /// All of them, in the order of the tabs.
-    pub const ALL: [Self; 6] = [Self::Episode, Self::Why, Self::Gains, Self::Push, Self::Compare, Self::Author];
-
-    /// The tab's text.
-    pub fn title(self) -> &'static str {
-        match self {
-            Self::Episode => "Episode",
-            Self::Why => "Why",
-            Self::Gains => "Gains",
-            Self::Push => "Push",
-            Self::Compare => "Compare",
-            Self::Author => "Author",
-        }
-    }
-}
 
 /// What the colour of a drawn voxel says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -140,6 +105,27 @@ pub enum Hovered {
     View(ViewId),
     /// A candidate to move something.
     Manipulation(Manipulation),
+}
+
+/// How far a person has moved the arm along its motion: of which step, and to which time, seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scrubbed(Option<((SessionId, usize), f64)>);
+
+impl Scrubbed {
+    /// The time in the motion of a step, seconds; `None` where nobody moves the arm along it.
+    pub fn at_s(&self, step: (SessionId, usize)) -> Option<f64> {
+        self.0.filter(|(of, _)| *of == step).map(|(_, at_s)| at_s)
+    }
+
+    /// Moves the arm to a time in the motion of a step, seconds.
+    pub fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
+        self.0 = Some((step, at_s));
+    }
+
+    /// Shows the step without the arm again.
+    pub fn hide(&mut self) {
+        self.0 = None;
+    }
 }
 
 /// With what an episode is started.
@@ -285,8 +271,8 @@ pub struct Model {
     pub browser: Browser,
     /// Messages that fade.
     pub toasts: Toasts,
-    /// What the panels remember from frame to frame.
-    pub panels: panels::State,
+    /// How far the arm is moved along its motion.
+    pub scrubbed: Scrubbed,
 }
 
 impl Model {

@@ -1,8 +1,7 @@
-//! The panels: functions of the model that draw themselves and return commands.
+//! The panels: each draws a part of the window from the model and returns commands ([`Panel`]).
 //!
-//! Every panel is `show(ui, model, ask)`: it reads the model, writes only what belongs to looking (what the pointer is
-//! over, which row is chosen), and pushes onto `ask` what shall be done. What a panel remembers from frame to frame
-//! (textures, the order of a table) is its `State`, kept in [`State`] by the model.
+//! What a panel remembers from frame to frame (textures, the order of a table) is its own `State`, which the window keeps
+//! beside the model; the model knows no panel.
 
 pub mod author;
 pub mod camera;
@@ -38,31 +37,24 @@ mod words;
 #[cfg(test)]
 mod tests;
 
+use super::command::Command;
 use super::model::{Hovered, Model};
-use super::session::SessionId;
 use nudge_core::camera::ViewId;
+use nudge_core::episode::{EpisodeRecord, NO_TRUTH};
 use re_viewer::external::egui;
 
-/// What the panels remember from frame to frame.
-#[derive(Default)]
-pub struct State {
-    maps: maps::State,
-    camera: camera::State,
-    decision: decision::State,
-    gains: gains::State,
-    push: push::State,
-    compare: compare::State,
+/// A part of the window that draws itself, and owns what it remembers from frame to frame.
+///
+/// A panel that remembers nothing is a function `show(ui, model, ask)`; every such function is a panel.
+pub trait Panel {
+    /// Draws it. It reads the model, writes only what belongs to looking (what the pointer is over, which row is chosen),
+    /// and pushes onto `ask` what shall be done.
+    fn show(&mut self, ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>);
 }
 
-impl State {
-    /// How far the arm's motion of a step is scrubbed, seconds.
-    pub fn motion_s(&self, step: (SessionId, usize)) -> Option<f64> {
-        self.push.motion_s(step)
-    }
-
-    /// Moves the arm to a time in the motion of a step, seconds.
-    pub fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
-        self.push.scrub(step, at_s);
+impl<F: FnMut(&mut egui::Ui, &mut Model, &mut Vec<Command>)> Panel for F {
+    fn show(&mut self, ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        self(ui, model, ask);
     }
 }
 
@@ -102,7 +94,7 @@ fn empty(ui: &mut egui::Ui, text: &str) {
 
 /// Which way an arrow key was pressed on a widget that has the keyboard's focus: to the right and up are positive; by ten
 /// with shift.
-fn arrows(ui: &egui::Ui, response: &egui::Response) -> Option<[i32; 2]> {
+fn arrow_keys(ui: &egui::Ui, response: &egui::Response) -> Option<[i32; 2]> {
     if !response.has_focus() {
         return None;
     }
@@ -141,6 +133,13 @@ fn framed(ui: &mut egui::Ui) {
 fn heading(ui: &mut egui::Ui, title: impl Into<String>, hint: &str) -> egui::Response {
     let heading = ui.label(egui::RichText::new(title).strong());
     if hint.is_empty() { heading } else { heading.on_hover_text(hint) }
+}
+
+/// Says of an episode without truth why something is not shown.
+fn untold(ui: &mut egui::Ui, record: &EpisodeRecord) {
+    if !record.has_truth() {
+        ui.weak(NO_TRUTH).on_hover_text("Nobody knows what really stands there, so nothing is scored");
+    }
 }
 
 /// The empty state of every panel without an episode.

@@ -3,6 +3,7 @@
 use super::annotations::Annotations;
 use super::half_belief::HalfBelief;
 use crate::driver::default_out;
+use crate::record::decision::Series;
 use nudge_core::arm::ArmTool;
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, ViewId};
@@ -55,14 +56,16 @@ pub struct Moment {
     pub step: usize,
     /// What is believed, in half precision.
     pub belief: HalfBelief,
-    /// Voxels that do not count as a gain any more, if the planner leaves some out.
-    pub seen: Option<Arc<VoxelSet>>,
-    /// What is; shared by all moments between two pushes.
-    pub truth: Arc<TruthMap>,
+    /// Voxels that looks have seen and that no push has probably changed since.
+    pub seen: Arc<VoxelSet>,
+    /// What is, if that is known; shared by all moments between two pushes.
+    pub truth: Option<Arc<TruthMap>>,
     /// The bodies where they stand, dropped ones left out; shared like the truth.
     pub bodies: Arc<Vec<Body>>,
-    /// How belief and truth compare.
-    pub scores: Scores,
+    /// How belief and truth compare, if that is known.
+    pub scores: Option<Scores>,
+    /// Entropy of what is believed, nats.
+    pub entropy_nats: f64,
     /// What the step brought; `None` for the prior.
     pub outcome: Option<Arc<StepOutcome>>,
 }
@@ -71,6 +74,11 @@ impl Moment {
     /// What was weighed before the step; `None` for the prior.
     pub fn decision(&self) -> Option<&Decision> {
         self.outcome.as_ref().map(|outcome| &outcome.record.decision)
+    }
+
+    /// A score of the state; without a truth there is the entropy alone.
+    pub fn score(&self, series: &Series) -> Option<f64> {
+        series.at(self.scores.as_ref(), self.entropy_nats)
     }
 }
 

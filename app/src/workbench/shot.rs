@@ -77,7 +77,7 @@ pub fn shoot(shot: &Shot, out: PathBuf) -> Result<Vec<(LayoutKind, RgbImage)>> {
             let model = &mut harness.state_mut().model;
             let step = model.session().map(|session| (session.id, model.cursor.min(session.steps())));
             model.kept.display.robot = true;
-            step.into_iter().for_each(|step| model.panels.scrub(step, at_s));
+            step.into_iter().for_each(|step| model.scrubbed.scrub(step, at_s));
         }
         explain(harness.state_mut(), layout);
         settle(&mut harness)?;

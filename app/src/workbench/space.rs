@@ -5,6 +5,8 @@
 //! last one, and remembers which voxel every drawn instance is, for picking.
 
 mod arm;
+pub mod at;
+mod layout;
 mod outlines;
 mod push;
 mod voxels;
@@ -12,7 +14,7 @@ mod voxels;
 use super::half_belief::HalfBelief;
 use super::model::{ColourBy, Display, GainSource, Hovered, LayoutKind, Picked, Preview};
 use super::session::{Moment, Session, SessionId, Setup};
-use super::{space_layout, viewer};
+use super::viewer;
 use crate::colors::{Colormap, Rgb};
 use crate::record::layout::Ground;
 use crate::record::shapes;
@@ -29,56 +31,6 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use voxels::{Voxels, voxel_key};
 
-/// Entities of the window's recording.
-pub mod at {
-    /// The panels of the shelf.
-    pub const SHELF: &str = "shelf/panels";
-    /// Its edges.
-    pub const EDGES: &str = "shelf/edges";
-    /// The outlines of the true objects.
-    pub const OBJECTS: &str = "objects";
-    /// The belief of the shown episode.
-    pub const BELIEF: &str = "belief";
-    /// The candidate views.
-    pub const VIEWS: &str = "camera/views";
-    /// The view that was looked from last.
-    pub const CURRENT: &str = "camera/current";
-    /// The push candidates.
-    pub const CANDIDATES: &str = "push/candidates";
-    /// The push that was done or is looked at.
-    pub const CHOSEN: &str = "push/chosen";
-    /// How the tool stands at the beginning of it, where its skill tells.
-    pub const LINES: &str = "push/lines";
-    /// What it sweeps.
-    pub const SWEPT: &str = "push/swept";
-    /// The belief that it is predicted to leave.
-    pub const PREDICTED: &str = "push/predicted";
-    /// How that differs from now.
-    pub const DIFFERENCE: &str = "push/difference";
-    /// What it really left.
-    pub const HAPPENED: &str = "push/happened";
-    /// Why there is nothing of it to show.
-    pub const HAPPENED_NOTE: &str = "push/happened/note";
-    /// The arm.
-    pub const ARM: &str = "robot/arm";
-    /// The way of its tip.
-    pub const ARM_PATH: &str = "robot/path";
-    /// Where a gain comes from.
-    pub const GAIN: &str = "gain";
-    /// The belief of the second episode.
-    pub const OTHER: &str = "other/belief";
-    /// The outlines of its true objects.
-    pub const OTHER_OBJECTS: &str = "other/objects";
-    /// How the two beliefs differ.
-    pub const BETWEEN: &str = "between";
-    /// What the pointer is over.
-    pub const HOVERED: &str = "pointer/hovered";
-    /// What is asked about.
-    pub const PICKED: &str = "pointer/picked";
-}
-
-/// Probability changes smaller than this are not drawn.
-const CHANGED: f32 = 0.05;
 /// Drawn instances of one entity at most, so that the window stays quick.
 const MOST_VOXELS: usize = 200_000;
 
@@ -99,8 +51,6 @@ pub struct Side {
     pub after: Option<Arc<Moment>>,
     /// What was decided at the cursor, or is pending.
     pub decision: Option<Arc<Decision>>,
-    /// The weight of the disturbance term in the episode's decisions.
-    pub gamma: f32,
 }
 
 impl Side {
@@ -115,7 +65,6 @@ impl Side {
             before: step.checked_sub(1).map(|before| session.moment(before).clone()),
             after: session.moments.get(step + 1).cloned(),
             decision: session.decision_after(step).cloned().map(Arc::new),
-            gamma: session.record.config.planner.gamma,
             moment,
         }
     }
@@ -220,7 +169,7 @@ impl Painter {
         if space.layout == LayoutKind::Push {
             self.push_views(side, space);
         }
-        if space.layout == LayoutKind::Gains {
+        if space.layout.shows_gain() {
             self.gain(side, space);
         }
         if space.layout == LayoutKind::Compare {
@@ -234,8 +183,8 @@ impl Painter {
     /// Arranges the views, where others are wanted than there are.
     fn lay_out(&mut self, space: &Space, ground: Ground) {
         let size = space.side.as_ref().map_or([0.8, 0.4, 0.4], |side| side.shelf.size);
-        let (aspect, arm) = (space_layout::coarse(space.aspect), space.shows_arm());
-        let Some((views, layout)) = space_layout::of(space.layout, aspect, size, ground, arm) else { return };
+        let (aspect, arm) = (layout::coarse(space.aspect), space.shows_arm());
+        let Some((views, layout)) = layout::of(space.layout, aspect, size, ground, arm) else { return };
         let wanted = Some((views, aspect, size, ground, arm));
         if self.layout != wanted
             && let Err(error) = layout.send(&self.stream, viewer::APPLICATION)
@@ -289,7 +238,7 @@ impl Painter {
             self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
         }
         for entity in [at::CANDIDATES, at::CHOSEN] {
-            self.log(entity, &push::no_arrows());
+            self.log(entity, &no_arrows());
         }
         self.log(at::HAPPENED_NOTE, &rerun::Points3D::new(Vec::<[f32; 3]>::new()));
         for entity in [at::SHELF, at::ARM] {
@@ -334,13 +283,14 @@ impl Painter {
             (Some(before), ColourBy::Change) => Some(self.full((side.id, before.step), &before.belief)),
             _ => None,
         };
-        let (voxels, rgb) = Voxels { belief: &belief, truth: &side.moment.truth, catalog: &side.setup.catalog }
-            .drawn(&space.display, before.as_deref());
+        let (voxels, rgb) =
+            Voxels { belief: &belief, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
+                .drawn(&space.display, before.as_deref());
         self.log_voxels(at::BELIEF, &belief.grid, voxels, rgb);
     }
 
     fn cameras(&mut self, side: &Side, space: &Space) {
-        let shown = space.display.views || space.layout == LayoutKind::Gains;
+        let shown = space.display.views || space.layout.shows_gain();
         let gains = side.decision.as_ref().map(|decision| &decision.gains);
         if self.differs(at::VIEWS, format!("{shown} {:?} {}", side.key(), gains.is_some())) {
             let views = &side.setup.views;
@@ -389,8 +339,9 @@ impl Painter {
         let key = format!("{:?} {:?}", other.key(), voxel_key(&space.display));
         let b = self.full(other.key(), &other.moment.belief);
         if self.differs(at::OTHER, key.clone()) {
-            let (voxels, rgb) = Voxels { belief: &b, truth: &other.moment.truth, catalog: &other.setup.catalog }
-                .drawn(&space.display, None);
+            let (voxels, rgb) =
+                Voxels { belief: &b, truth: other.moment.truth.as_deref(), catalog: &other.setup.catalog }
+                    .drawn(&space.display, None);
             self.log_voxels(at::OTHER, &b.grid, voxels, rgb);
         }
         let shown = space.display.truth.then_some(&other.moment.bodies);
@@ -404,8 +355,9 @@ impl Painter {
                 return self.log_voxels(at::BETWEEN, &a.grid, Vec::new(), |_| [0; 3]);
             }
             let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..space.display.clone() };
-            let (voxels, rgb) = Voxels { belief: &a, truth: &side.moment.truth, catalog: &side.setup.catalog }
-                .drawn(&changed, Some(&b));
+            let (voxels, rgb) =
+                Voxels { belief: &a, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
+                    .drawn(&changed, Some(&b));
             self.log_voxels(at::BETWEEN, &a.grid, voxels, rgb);
         }
     }
@@ -445,6 +397,10 @@ impl Painter {
 fn thinned(voxels: Vec<usize>) -> Vec<usize> {
     let step = voxels.len().div_ceil(MOST_VOXELS).max(1);
     if step == 1 { voxels } else { voxels.into_iter().step_by(step).collect() }
+}
+
+fn no_arrows() -> rerun::Arrows3D {
+    rerun::Arrows3D::from_vectors(Vec::<[f32; 3]>::new())
 }
 
 /// A mesh that cannot be seen.

@@ -1,7 +1,17 @@
 //! Messages that fade: what happened, to which file, and what can be done.
 
-use super::command::Level;
 use std::time::{Duration, Instant};
+
+/// How much a message matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Level {
+    /// Good to know.
+    Info,
+    /// Something is not as asked.
+    Warning,
+    /// Something failed.
+    Error,
+}
 
 /// A message on its way out.
 #[derive(Clone, Debug)]

@@ -273,10 +273,16 @@ fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Momen
     Moment {
         step: episode.record().steps.len(),
         belief: HalfBelief::of(episode.belief()),
-        seen: episode.seen().cloned().map(Arc::new),
-        truth: shared.map_or_else(|| Arc::new(episode.truth().clone()), |before| before.truth.clone()),
+        seen: Arc::new(episode.seen().clone()),
+        truth: shared.map_or_else(|| episode.truth().cloned().map(Arc::new), |before| before.truth.clone()),
         bodies: shared.map_or_else(|| Arc::new(episode.bodies()), |before| before.bodies.clone()),
-        scores: outcome.as_ref().map_or(episode.record().prior, |outcome| outcome.record.scores),
+        scores: match &outcome {
+            Some(outcome) => outcome.record.scores().copied(),
+            None => episode.record().prior.scores,
+        },
+        entropy_nats: outcome
+            .as_ref()
+            .map_or(episode.record().prior.entropy_nats, |outcome| outcome.record.entropy_nats),
         outcome: outcome.map(Arc::new),
     }
 }

@@ -1,14 +1,25 @@
 //! Kinematics of any chain: the Jacobian, how far from a singularity, and the inverse by whichever way fits.
 
+use super::closed_form::ThreeParallel;
 use super::model::{Arm, JointKind};
-use super::{Frame, Joints, numeric};
+use super::numeric::{self, METRES_PER_RADIAN};
+use super::{Frame, Joints};
 use nalgebra::{Matrix6, Vector6};
 use std::f64::consts::TAU;
 
-/// Metres that count as much as a radian where translation and rotation are compared.
-pub(super) const METRES_PER_RADIAN: f64 = 0.25;
-
 impl Arm {
+    /// The closed-form inverse, if the arm is built in the way that has one.
+    pub(super) fn three_parallel(&self) -> Option<ThreeParallel> {
+        if self.joints.len() != 6 || self.joints.iter().any(|joint| joint.kind != JointKind::Turning) {
+            return None;
+        }
+        let poses = self.body_poses(&Joints::zero(6));
+        let base_from = |at: usize| self.world_from_base.inv_mul(&poses[at]);
+        let axes = std::array::from_fn(|i| base_from(i + 1).rotation * self.joints[i].axis.into_inner());
+        let points = std::array::from_fn(|i| base_from(i + 1).translation.vector);
+        ThreeParallel::of(axes, points, &(base_from(6) * self.last_from_tool))
+    }
+
     /// Columns of the geometric Jacobian of the tool: velocity (m/s) over angular velocity (rad/s), shelf's frame.
     pub fn jacobian(&self, joints: &Joints) -> Vec<Vector6<f64>> {
         let poses = self.body_poses(joints);

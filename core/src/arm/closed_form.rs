@@ -4,7 +4,6 @@
 //! kinematics using subproblem decomposition" (2022), so that it holds for any such arm in whatever frames its URDF file
 //! is written, and not for one maker's table of parameters.
 
-use super::model::{Arm, JointKind};
 use super::{Frame, Joints};
 use nalgebra::{Rotation3, Unit, UnitQuaternion, Vector3};
 
@@ -31,22 +30,15 @@ pub(super) struct ThreeParallel {
 }
 
 impl ThreeParallel {
-    /// The arm's axes, if it is built that way.
-    pub(super) fn of(arm: &Arm) -> Option<Self> {
-        if arm.joints.len() != 6 || arm.joints.iter().any(|joint| joint.kind != JointKind::Turning) {
-            return None;
-        }
-        let poses = arm.body_poses(&Joints::zero(6));
-        let base_from = |at: usize| arm.world_from_base.inv_mul(&poses[at]);
-        let h: [V; 6] = std::array::from_fn(|i| base_from(i + 1).rotation * arm.joints[i].axis.into_inner());
-        let p: [V; 6] = std::array::from_fn(|i| base_from(i + 1).translation.vector);
+    /// Of six turning joints: axes `h` and points `p` on them at zero, and the tool at zero, all in the base's frame;
+    /// `None` if the arm is not built that way.
+    pub(super) fn of(h: [V; 6], p: [V; 6], tool: &Frame) -> Option<Self> {
         let parallel = |a: V, b: V| (a.dot(&b).abs() > 1.0 - 1e-9).then(|| a.dot(&b).signum());
         let sign = [parallel(h[1], h[2])?, parallel(h[1], h[3])?];
         if parallel(h[0], h[1]).is_some() || parallel(h[3], h[4]).is_some() {
             return None;
         }
         let wrist = crossing(p[4], h[4], p[5], h[5])?;
-        let tool = base_from(6) * arm.last_from_tool;
         Some(Self {
             h,
             sign,

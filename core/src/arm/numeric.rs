@@ -1,11 +1,12 @@
 //! The inverse of any serial arm by damped least squares (Wampler 1986; Nakamura and Hanafusa 1986).
 
-use super::chain::METRES_PER_RADIAN;
 use super::model::Arm;
 use super::{Frame, Joints};
 use crate::rng::stream;
 use nalgebra::{Matrix6, Vector6};
 
+/// Metres that count as much as a radian where translation and rotation are compared.
+pub(super) const METRES_PER_RADIAN: f64 = 0.25;
 /// Steps until a start is given up.
 const STEPS: usize = 80;
 /// Starts besides the configuration that was asked from.

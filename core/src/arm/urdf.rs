@@ -6,7 +6,6 @@
 //! of meshes (.stl, .obj, .glb). A link without any has its visuals instead.
 
 use super::bounds::{reaches, self_pairs};
-use super::closed_form::ThreeParallel;
 use super::cover::{Ball, cover};
 use super::description::{Description, JointElement};
 use super::model::{Arm, Joint, JointKind, Part, Role, identity};
@@ -150,7 +149,7 @@ impl<'r> Reader<'r> {
             closed_form: None,
         };
         arm.reach_m = reaches(&arm);
-        arm.closed_form = ThreeParallel::of(&arm);
+        arm.closed_form = arm.three_parallel();
         arm.self_pairs = self_pairs(&arm);
         arm.warnings = warnings(robot, &moving, &arm);
         Ok(arm)

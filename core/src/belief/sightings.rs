@@ -40,6 +40,17 @@ impl Sightings {
         &self.seen
     }
 
+    /// Number of looks that changed each column of a drifting belief.
+    pub fn taken(&self) -> &[u8] {
+        &self.taken
+    }
+
+    /// Sightings as they were kept; `None` for parts that are not of this grid.
+    pub fn from_parts(grid: &Grid, seen: VoxelSet, taken: Vec<u8>) -> Option<Self> {
+        let fits = seen.voxel_count() == grid.voxel_count() && taken.len() == grid.cell_count();
+        fits.then_some(Self { grid: *grid, seen, taken })
+    }
+
     /// Adds the voxels that a look sees.
     fn add(&mut self, observation: &MapObservation) {
         self.seen.union_with(&observation.occupied);

@@ -1,18 +1,19 @@
-//! Projection of an image into the grid: free voxels that rays pass, occupied voxels that they hit, and labels from
+//! Projection of a frame into the grid: free voxels that rays pass, occupied voxels that they hit, and labels from
 //! above.
 //!
 //! Three rules decide where observations contradict each other:
 //!
 //! * A voxel with a hit is occupied, even where other rays pass through it (an edge crosses it).
 //! * A hit on board, walls, back or ceiling is never occupied. Pixels labelled background are such hits; so are those of
-//!   any label that lie within a millimetre of a shelf surface or outside the grid.
+//!   any label that lie within a millimetre of a shelf surface or outside the grid. Pixels without a label are taken for the
+//!   shelf's within a centimetre of it; further away they are a surface of no class.
 //! * Column closure fills unobserved voxels only: above a free voxel free, below an occupied one occupied, up or down
 //!   to the first observation that contradicts it. An unobserved voxel between a free one below and an occupied one
 //!   above is claimed by both and stays unobserved.
 
 mod walk;
 
-use super::{Image, Intrinsics, MapObservation, UNOBSERVED, View};
+use super::{Frame, MapObservation, UNLABELLED, UNOBSERVED};
 use crate::Point;
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::{BACKGROUND, Shelf};
@@ -23,8 +24,8 @@ use walk::{LANES, SeenThrough, Segment};
 const NUDGE_M: f32 = 1e-4;
 /// A hit this near a shelf surface is the shelf's, whatever its label, metres.
 const SHELF_M: f32 = 1e-3;
-/// A background hit this near the board, and nearer to it than to back and walls, labels its cell as background,
-/// metres; the noise of a depth camera at a metre is a few millimetres.
+/// A background hit this near the board, and nearer to it than to back and walls, labels its cell as background, and a hit
+/// without a label is the shelf's this near to it, metres; the noise of a depth camera at a metre is a few millimetres.
 const BOARD_M: f32 = 0.01;
 
 /// What some of the image's rows say.
@@ -63,17 +64,18 @@ impl Partial {
     }
 }
 
-/// Projects an image, taken by `view`, into the shelf's grid.
+/// Projects a frame into the shelf's grid.
 ///
 /// Free are all voxels that a ray crosses before its hit minus half a voxel; pixels without depth say nothing. No voxel
 /// is both free and occupied. The result does not depend on the number of threads.
-pub fn project(image: &Image, view: &View, intrinsics: &Intrinsics, shelf: &Shelf) -> MapObservation {
+pub fn project(frame: &Frame, shelf: &Shelf) -> MapObservation {
     let grid = shelf.grid();
-    let height = image.size[1];
+    let height = frame.size()[1];
+    let labels = frame.labels();
     let rows = height.div_ceil(rayon::current_num_threads() * 2).max(1);
     let whole = (0..height.div_ceil(rows))
         .into_par_iter()
-        .map(|task| project_rows(image, view, intrinsics, shelf, task * rows..((task + 1) * rows).min(height)))
+        .map(|task| project_rows(frame, &labels, shelf, task * rows..((task + 1) * rows).min(height)))
         .reduce_with(|a, b| a.merge(&b))
         .unwrap_or_else(|| Partial::empty(&grid));
     let (mut free, mut occupied) = (VoxelSet::empty(&grid), VoxelSet::empty(&grid));
@@ -113,23 +115,18 @@ enum Voxel {
     Occupied,
 }
 
-fn project_rows(
-    image: &Image,
-    view: &View,
-    intrinsics: &Intrinsics,
-    shelf: &Shelf,
-    rows: std::ops::Range<usize>,
-) -> Partial {
+fn project_rows(frame: &Frame, labels: &[u8], shelf: &Shelf, rows: std::ops::Range<usize>) -> Partial {
     let grid = shelf.grid();
     let mut partial = Partial::empty(&grid);
-    let (from, width) = (view.position(), image.size[0]);
-    let axes = view.world_from_camera.rotation.to_rotation_matrix();
+    let (from, width) = (frame.position(), frame.size()[0]);
+    let (intrinsics, depth_m) = (frame.intrinsics(), frame.depth_m());
+    let axes = frame.world_from_camera().rotation.to_rotation_matrix();
     for row in rows {
         for columns in (0..width).step_by(LANES) {
             let mut segments = [Segment::NOTHING; LANES];
             for (segment, column) in segments.iter_mut().zip(columns..width) {
                 let at = row * width + column;
-                let hit = Hit { depth_m: image.depth_m[at], class: image.labels[at] };
+                let hit = Hit { depth_m: depth_m[at], class: labels[at] };
                 if hit.depth_m > 0.0 {
                     let ray = axes * intrinsics.ray(column, row);
                     let stretch = ray.norm();
@@ -158,11 +155,16 @@ fn add_hit(partial: &mut Partial, grid: &Grid, shelf: &Shelf, point: Point, clas
         if to_board.abs() < BOARD_M && to_board.abs() <= to_others {
             partial.label(cell, 0.0, BACKGROUND.0);
         }
-    } else if to_board.min(to_others) > SHELF_M
+        return;
+    }
+    let margin_m = if class == UNLABELLED { BOARD_M } else { SHELF_M };
+    if to_board.min(to_others) > margin_m
         && let Some(voxel) = grid.voxel_at(point)
     {
         partial.occupied.push(grid.index(voxel));
-        partial.label(cell, point.z, class);
+        if class != UNLABELLED {
+            partial.label(cell, point.z, class);
+        }
     }
 }
 

@@ -63,12 +63,27 @@ fn straight(position: [f32; 3]) -> View {
     ViewArray::parse("test", &text).expect("a view").views.remove(0)
 }
 
+/// What a frame shows, pixel by pixel.
+struct Seen {
+    depth_m: Vec<f32>,
+    labels: Vec<u8>,
+    objects: Vec<u16>,
+}
+
+impl Seen {
+    fn of(sensed: Sensed) -> Self {
+        let frame = sensed.frame;
+        let labels = frame.labels().into_owned();
+        Self { depth_m: frame.depth_m().to_vec(), labels, objects: sensed.objects.expect("of a simulator") }
+    }
+}
+
 #[test]
 fn a_box_has_the_depth_and_the_outline_that_geometry_says() {
     let intrinsics = standard().intrinsics;
     let view = straight([0.0, -0.3, 0.1]);
     let block = standing(3, Solid::standing_box(Vector::new(0.1, 0.1, 0.3)), 0.0, 0.25, 0.0);
-    let image = render(&shelf(), &[block], &view, &intrinsics);
+    let image = Seen::of(render(&shelf(), &[block], &view, &intrinsics));
     let at = |column: usize, row: usize| row * intrinsics.width + column;
     // Its front is at y = 0.2, half a metre away: 0.1 m are 86.6 px.
     for (column, row) in [(320, 240), (280, 180), (360, 320)] {
@@ -89,7 +104,7 @@ fn the_shelf_hides_what_is_behind_its_panels() {
     let intrinsics = standard().intrinsics;
     // From below the board its front edge hides the shelf; a block behind it cannot be seen through it.
     let block = standing(3, Solid::standing_box(Vector::new(0.7, 0.05, 0.05)), 0.0, 0.2, 0.0);
-    let image = render(&shelf(), &[block], &straight([0.0, -0.3, -0.01]), &intrinsics);
+    let image = Seen::of(render(&shelf(), &[block], &straight([0.0, -0.3, -0.01]), &intrinsics));
     let at = |column: usize, row: usize| row * intrinsics.width + column;
     assert!((image.depth_m[at(320, 240)] - 0.3).abs() < 1e-4, "the edge of the board");
     assert_eq!(image.labels[at(320, 240)], BACKGROUND.0);
@@ -138,7 +153,7 @@ proptest! {
             body.world_from_body.translation.vector.z = lift;
         }
         let view = &array.views[view];
-        let image = render(&shelf(), &bodies, view, &array.intrinsics);
+        let image = Seen::of(render(&shelf(), &bodies, view, &array.intrinsics));
         let mut outline = 0;
         let mut tested = 0;
         for at in (offset..image.depth_m.len()).step_by(97) {
@@ -165,8 +180,7 @@ proptest! {
             body.world_from_body.rotation *= UnitQuaternion::from_axis_angle(&Vector::z_axis(), yaw);
         }
         let view = &array.views[view];
-        let image = render(&shelf, &bodies, view, &array.intrinsics);
-        let observation = project(&image, view, &array.intrinsics, &shelf);
+        let observation = project(&render(&shelf, &bodies, view, &array.intrinsics).frame, &shelf);
         let grid = shelf.grid();
         let truth = TruthMap::of(&grid, &bodies);
         // The height of a point above the nearest face of any object; negative inside.
@@ -213,11 +227,11 @@ fn a_free_column_and_an_occupied_one_are_closed() {
     let array = standard();
     let bodies = vec![standing(2, Solid::standing_box(Vector::new(0.1, 0.1, 0.15)), 0.0, 0.2, 0.0)];
     let view = &array.views[(5 * 10 + 5) * 3 + 1];
-    let image = render(&shelf(), &bodies, view, &array.intrinsics);
+    let frame = render(&shelf(), &bodies, view, &array.intrinsics).frame;
     let grid = shelf().grid();
     let open = Shelf { column_closure: false, ..shelf() };
-    let closed = project(&image, view, &array.intrinsics, &shelf());
-    let raw = project(&image, view, &array.intrinsics, &open);
+    let closed = project(&frame, &shelf());
+    let raw = project(&frame, &open);
     assert!(closed.occupied.len() > raw.occupied.len() && closed.free.len() > raw.free.len());
     assert_eq!(closed.labels, raw.labels);
     let column = |x: f32, y: f32| grid.column(grid.cell_index(grid.cell_at(Point::new(x, y, 0.0)).expect("inside")));
@@ -238,8 +252,10 @@ fn images_and_projections_do_not_depend_on_threads() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
             let view = &array.views[130];
-            let image = NoiseModel::STANDARD.take(&shelf(), &bodies, view, &array.intrinsics, 4, 2);
-            let observation = project(&image, view, &array.intrinsics, &shelf());
+            let noise = NoiseModel::STANDARD;
+            let aimed = noise.aim(view, 4, 2, |view| Ok(render(&shelf(), &bodies, view, &array.intrinsics)));
+            let image = noise.apply(&aimed.expect("a frame"), 4, 2);
+            let observation = project(&image, &shelf());
             let some = ViewArray { views: array.views[..9].to_vec(), ..array.clone() };
             (image, observation, visibility(&shelf(), &bodies, &some), TruthMap::of(&shelf().grid(), &bodies))
         })
@@ -266,7 +282,7 @@ fn an_object_behind_a_wall_of_boxes_is_hidden() {
     let all = visibility(&shelf(), &bodies, &array);
     assert!(all[5].is_hidden() && all[5].object == ObjectId(9) && all[..5].iter().all(|v| v.most_px > 10_000));
     // The fast search and the full count agree, and the count is that of the image.
-    let image = render(&shelf(), &bodies, &array.views[usize::from(all[2].view.0)], &array.intrinsics);
+    let image = Seen::of(render(&shelf(), &bodies, &array.views[usize::from(all[2].view.0)], &array.intrinsics));
     assert_eq!(image.objects.iter().filter(|object| **object == 2).count(), all[2].most_px);
     bodies.remove(2);
     assert_eq!(hidden_count(&shelf(), &bodies, &array), 0);

@@ -12,8 +12,17 @@
 //!     { position = [-0.3375, -0.2, 0.055], target = [-0.3, 0.25, 0.155], slot = [0, 0, 0] },
 //! ]
 //! ```
+//!
+//! Format 2 has room for full poses. A view has, beside `position` and `slot`, either a `target` and, if the camera is not
+//! upright, `roll_deg` (about its optical axis, clockwise as the camera sees it), or a `quaternion` (x, y, z, w) of
+//! `world_from_camera`:
+//!
+//! ```toml
+//! { position = [0.0, -0.3, 0.15], target = [0.0, 0.2, 0.15], roll_deg = 90.0, slot = [0, 0, 0] },
+//! { position = [0.0, -0.3, 0.15], quaternion = [-0.7071, 0.0, 0.0, 0.7071], slot = [1, 0, 0] },
+//! ```
 
-use super::{Intrinsics, View, ViewArray, ViewId};
+use super::{Intrinsics, Pinhole, View, ViewArray, ViewId, pose_from_quaternion};
 use crate::fixed::{self, Fixed};
 use crate::{Error, Point, Pose, Result, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
@@ -26,6 +35,9 @@ const SHIPPED: [(&str, &str); 2] = [
     ("standard300", include_str!("../../../assets/views/standard300.toml")),
     ("real75", include_str!("../../../assets/views/real75.toml")),
 ];
+
+/// How far ahead a camera that is given by its pose is said to look, metres.
+const AHEAD_M: f32 = 0.45;
 
 /// What was typed.
 #[derive(Deserialize)]
@@ -46,10 +58,44 @@ struct RawArray {
 struct RawView {
     #[serde(deserialize_with = "fixed::array")]
     position: [f32; 3],
-    #[serde(deserialize_with = "fixed::array")]
-    target: [f32; 3],
+    target: Option<Fixed<f32, 3>>,
+    roll_deg: Option<f32>,
+    quaternion: Option<Fixed<f32, 4>>,
     #[serde(deserialize_with = "fixed::array")]
     slot: [u16; 3],
+}
+
+impl RawView {
+    /// The camera's pose and the point that it looks at; for a pose without a target one as far ahead as the shelf's middle.
+    fn pose(&self, format: u32) -> std::result::Result<(Pose, [f32; 3]), String> {
+        if format == 1 && (self.roll_deg.is_some() || self.quaternion.is_some()) {
+            return Err("roll_deg and quaternion need format = 2".to_owned());
+        }
+        match (&self.target, &self.quaternion) {
+            (Some(target), None) => {
+                let upright = look_at(self.position, target.0)?;
+                let Some(roll_deg) = self.roll_deg else { return Ok((upright, target.0)) };
+                if !(roll_deg.abs() <= 360.0) {
+                    return Err(format!("roll_deg is {roll_deg}; -360 to 360 are allowed"));
+                }
+                let roll = UnitQuaternion::from_axis_angle(&Vector::z_axis(), roll_deg.to_radians());
+                Ok((upright * roll, target.0))
+            }
+            (None, Some(quaternion)) => {
+                if self.roll_deg.is_some() {
+                    return Err("a quaternion says the roll already: leave out roll_deg".to_owned());
+                }
+                if !self.position.iter().all(|x| x.is_finite() && x.abs() <= 100.0) {
+                    return Err("position must be finite and within 100 m".to_owned());
+                }
+                let given = pose_from_quaternion(self.position, quaternion.0)?;
+                let rotation = UnitQuaternion::new_normalize(*given.rotation.quaternion());
+                let pose = Pose::from_parts(given.translation, rotation);
+                Ok((pose, (pose * Point::new(0.0, 0.0, AHEAD_M)).coords.into()))
+            }
+            _ => Err("a view needs either target or quaternion".to_owned()),
+        }
+    }
 }
 
 impl ViewArray {
@@ -99,8 +145,8 @@ impl ViewArray {
             let place = e.span().map(|span| line(span.start)).unwrap_or_default();
             Error::input(path, place, e.message().lines().collect::<Vec<_>>().join(" "))
         })?;
-        if raw.format != 1 {
-            return Err(Error::input(path, "format", format!("is {}, this version reads format 1", raw.format)));
+        if !(1..=2).contains(&raw.format) {
+            return Err(Error::input(path, "format", format!("is {}, this version reads formats 1 and 2", raw.format)));
         }
         let camera = raw.camera.get_ref();
         check_camera(camera).map_err(|e| Error::input(path, line(raw.camera.span().start), e))?;
@@ -114,7 +160,8 @@ impl ViewArray {
         for (index, view) in raw.views.iter().enumerate() {
             let place = || format!("{}, view {index}", line(view.span().start));
             let view = view.get_ref();
-            let world_from_camera = look_at(view.position, view.target).map_err(|e| Error::input(path, place(), e))?;
+            let (world_from_camera, target) =
+                view.pose(raw.format).map_err(|words| Error::input(path, place(), words))?;
             if view.slot.iter().zip(layout).any(|(&slot, size)| usize::from(slot) >= size) {
                 return Err(Error::input(path, place(), format!("slot {:?} is outside layout {layout:?}", view.slot)));
             }
@@ -122,7 +169,7 @@ impl ViewArray {
                 return Err(Error::input(path, place(), format!("slot {:?} is already view {other}'s", view.slot)));
             }
             let id = ViewId(index as u16);
-            views.push(View { id, world_from_camera, target: view.target, slot: view.slot });
+            views.push(View { id, world_from_camera, target, slot: view.slot });
         }
         if views.is_empty() {
             return Err(Error::input(path, "views", "there is none"));
@@ -137,17 +184,13 @@ impl ViewArray {
 }
 
 fn check_camera(camera: &Intrinsics) -> std::result::Result<(), String> {
-    let [near, far] = camera.depth_range_m;
-    if !((1..=4096).contains(&camera.width) && (1..=4096).contains(&camera.height)) {
-        return Err(format!("an image of {} x {} pixels; 1 to 4096 are allowed", camera.width, camera.height));
-    }
     if !(camera.focal_px.is_finite() && camera.focal_px >= 1.0) {
         return Err(format!("focal_px is {}, at least 1 is needed", camera.focal_px));
     }
-    if !(near >= 0.0 && near < far && far <= 100.0) {
-        return Err(format!("depth_range_m is [{near}, {far}]; it must rise and be within 0 to 100 m"));
-    }
-    Ok(())
+    let words = |(field, words): (&str, String)| {
+        if field == "intrinsics" { words } else { format!("{field} {words}") }
+    };
+    Pinhole::from(*camera).check().map_err(words)
 }
 
 /// The pose of a camera at `position` that looks at `target`, upright (its x axis is level).
@@ -241,12 +284,42 @@ mod tests {
     }
 
     #[test]
+    fn a_view_may_be_any_pose() {
+        let array = |view: &str| {
+            let text = format!(
+                "format = 2\nname = \"x\"\ncamera = {{ width = 64, height = 48, focal_px = 40.0, depth_range_m = [0.1, 1.5] }}\n\
+                 layout = [1, 1, 1]\nviews = [\n  {{ position = [0, -0.3, 0.15], {view}, slot = [0, 0, 0] }},\n]\n"
+            );
+            ViewArray::parse("x.toml", &text).map(|array| array.views[0].clone())
+        };
+        let upright = array("target = [0, 0.2, 0.15]").expect("as in format 1");
+        let rolled = array("target = [0, 0.2, 0.15], roll_deg = 90").expect("a roll");
+        let axis = |view: &View, at: usize| view.world_from_camera.rotation * Vector::ith(at, 1.0);
+        // The camera's right is now where its down was: on the board's side.
+        assert!((axis(&rolled, 0) - axis(&upright, 1)).norm() < 1e-6 && axis(&rolled, 0).z < -0.99);
+        assert!((axis(&rolled, 2) - axis(&upright, 2)).norm() < 1e-6, "it looks the same way");
+        let posed = array("quaternion = [-0.70710677, 0, 0, 0.70710677]").expect("a pose");
+        assert!((posed.world_from_camera.rotation.angle_to(&upright.world_from_camera.rotation)) < 1e-3);
+        assert!((posed.target[1] - 0.15).abs() < 1e-4, "{:?}", posed.target);
+        let cases = [
+            ("quaternion = [0.5, 0, 0, 1]", "the quaternion [0.5, 0.0, 0.0, 1.0] is no rotation"),
+            ("quaternion = [0, 0, 0, 1], target = [0, 1, 0]", "a view needs either target or quaternion"),
+            ("quaternion = [0, 0, 0, 1], roll_deg = 5", "a quaternion says the roll already"),
+            ("target = [0, 0.2, 0.15], roll_deg = nan", "roll_deg is NaN"),
+        ];
+        for (view, words) in cases {
+            let said = array(view).expect_err(view).to_string();
+            assert!(said.starts_with(&format!("x.toml: line 6, view 0: {words}")), "{said}");
+        }
+    }
+
+    #[test]
     fn wrong_files_are_told_by_file_line_and_view() {
         let good = "format = 1\nname = \"x\"\ncamera = { width = 64, height = 48, focal_px = 40.0, depth_range_m = [0.1, 1.5] }\n\
                     layout = [1, 1, 2]\nviews = [\n  { position = [0, -0.2, 0.1], target = [0, 0.2, 0.1], slot = [0, 0, 0] },\n]\n";
         assert!(ViewArray::parse("x.toml", good).is_ok());
         let cases = [
-            ("format = 1", "format = 2", "x.toml: format: is 2"),
+            ("format = 1", "format = 3", "x.toml: format: is 3"),
             ("name = \"x\"", "nme = \"x\"", "x.toml: line 2: unknown field `nme`"),
             ("focal_px = 40.0", "focal_px = nan", "x.toml: line 3: focal_px is NaN"),
             ("width = 64", "width = 0", "x.toml: line 3: an image of 0"),

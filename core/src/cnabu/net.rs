@@ -32,6 +32,21 @@ pub(super) fn conv(path: nn::Path<'_>, from: i64, to: i64, kernel: i64) -> nn::C
     nn::conv2d(path, from, to, kernel, nn::ConvConfig { padding: kernel / 2, ..Default::default() })
 }
 
+/// A 1 x 1 convolution whose output begins near `bias`: what a network says before it has learnt.
+pub(super) fn head(path: nn::Path<'_>, from: i64, to: i64, bias: f64) -> nn::Conv2D {
+    let init = nn::ConvConfig {
+        ws_init: nn::Init::Randn { mean: 0.0, stdev: 0.02 },
+        bs_init: nn::Init::Const(bias),
+        ..Default::default()
+    };
+    nn::conv2d(path, from, to, 1, init)
+}
+
+/// What every channel of the planes is multiplied by or shifted by, to be learnt from `value` on.
+pub(super) fn per_channel(path: &nn::Path<'_>, name: &str, channels: i64, value: f64) -> Tensor {
+    path.var(name, &[1, channels, 1, 1], nn::Init::Const(value))
+}
+
 /// Two 3 x 3 convolutions with group norm, and a way past them.
 #[derive(Debug)]
 pub(super) struct Block {

@@ -6,7 +6,7 @@
 //! prior Dirichlet and a slice of the occupancy posterior 3 cm above the board.
 
 use super::layout::{LABELS, LEVELS, OCCUPANCY, SEMANTICS, SUBS};
-use super::net::{Network, UNet, conv};
+use super::net::{Network, UNet, conv, head, per_channel};
 use crate::scene::CLASS_COUNT;
 use tch::nn::{self, Module};
 use tch::{Kind, Tensor};
@@ -125,34 +125,24 @@ impl Network for ObserveNet {
     fn new(path: &nn::Path<'_>, width: i64) -> Self {
         let (occupancy, semantics, labels) = (2 * OCCUPANCY as i64, SEMANTICS as i64, LABELS as i64);
         let stem = 2 * width;
-        let per_channel =
-            |name: &str, channels: i64, value: f64| path.var(name, &[1, channels, 1, 1], nn::Init::Const(value));
-        let small = |name: &str, from: i64, to: i64, bias: f64| {
-            let init = nn::ConvConfig {
-                ws_init: nn::Init::Randn { mean: 0.0, stdev: 0.02 },
-                bs_init: nn::Init::Const(bias),
-                ..Default::default()
-            };
-            nn::conv2d(path / name, from, to, 1, init)
-        };
         Self {
             stem_prior: conv(path / "stem_prior", occupancy, stem, 1),
             stem_semantics: conv(path / "stem_semantics", semantics, stem, 1),
             stem_observed: conv(path / "stem_observed", occupancy, stem, 1),
             stem_labels: conv(path / "stem_labels", labels, stem, 1),
             unet: UNet::new(&(path / "unet"), stem, width),
-            occupancy_head: small("occupancy_head", width, occupancy, -1.0),
+            occupancy_head: head(path / "occupancy_head", width, occupancy, -1.0),
             semantic_mix: conv(path / "semantic_mix", width, SEMANTIC_WIDTH, 1),
             semantic_labels: conv(path / "semantic_labels", labels, SEMANTIC_WIDTH, 1),
             semantic_prior: conv(path / "semantic_prior", semantics, SEMANTIC_WIDTH, 1),
             semantic_slice: conv(path / "semantic_slice", 2 * SUBS as i64, SEMANTIC_WIDTH, 1),
             semantic_inner: conv(path / "semantic_inner", SEMANTIC_WIDTH, SEMANTIC_WIDTH, 3),
-            semantic_head: small("semantic_head", SEMANTIC_WIDTH, semantics, -1.0),
-            keep_occupancy: per_channel("keep_occupancy", occupancy, 1.0),
-            agree: per_channel("agree", occupancy, 2.0),
-            disagree: per_channel("disagree", occupancy, -1.0),
-            keep_semantics: per_channel("keep_semantics", semantics, 1.0),
-            label: per_channel("label", semantics, 2.0),
+            semantic_head: head(path / "semantic_head", SEMANTIC_WIDTH, semantics, -1.0),
+            keep_occupancy: per_channel(path, "keep_occupancy", occupancy, 1.0),
+            agree: per_channel(path, "agree", occupancy, 2.0),
+            disagree: per_channel(path, "disagree", occupancy, -1.0),
+            keep_semantics: per_channel(path, "keep_semantics", semantics, 1.0),
+            label: per_channel(path, "label", semantics, 2.0),
         }
     }
 }

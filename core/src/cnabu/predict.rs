@@ -3,8 +3,8 @@
 
 use super::layout::{LEVELS, Layout, Mirror, OCCUPANCY, SEMANTICS, SUBS, VOXELS_PER_LEVEL};
 use super::observe_net::{Evidence, LOG_EVIDENCE_LIMIT};
+use super::pool::Pool;
 use super::push_net::{Body, MARKS, Pixels, PriorParts, PushNet, PushPlanes, WINDOW};
-use super::update::Pool;
 use crate::belief::{Belief, Intervention, Moved, Prediction, Stroke};
 use crate::grid::{VoxelSet, Window};
 use crate::scene::CLASS_COUNT;

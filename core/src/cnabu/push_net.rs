@@ -12,7 +12,7 @@
 //! it.
 
 use super::layout::{OCCUPANCY, SEMANTICS, SUBS};
-use super::net::{Network, UNet, conv};
+use super::net::{Network, UNet, conv, head, per_channel};
 use super::observe_net::Evidence;
 use std::ops::Range;
 use tch::Tensor;
@@ -164,16 +164,6 @@ impl Network for PushNet {
     fn new(path: &nn::Path<'_>, width: i64) -> Self {
         let (occupancy, semantics) = (2 * OCCUPANCY as i64, SEMANTICS as i64);
         let stem = 2 * width;
-        let per_channel =
-            |name: &str, channels: i64, value: f64| path.var(name, &[1, channels, 1, 1], nn::Init::Const(value));
-        let small = |name: &str, to: i64, bias: f64| {
-            let init = nn::ConvConfig {
-                ws_init: nn::Init::Randn { mean: 0.0, stdev: 0.02 },
-                bs_init: nn::Init::Const(bias),
-                ..Default::default()
-            };
-            nn::conv2d(path / name, width, to, 1, init)
-        };
         Self {
             stem_prior: conv(path / "stem_prior", occupancy, stem, 1),
             stem_semantics: conv(path / "stem_semantics", semantics, stem, 1),
@@ -182,19 +172,19 @@ impl Network for PushNet {
             stem_arriving: conv(path / "stem_arriving", occupancy, stem, 1),
             stem_labels: conv(path / "stem_labels", semantics, stem, 1),
             unet: UNet::new(&(path / "unet"), stem, width),
-            occupancy_head: small("occupancy_head", occupancy, 0.0),
+            occupancy_head: head(path / "occupancy_head", width, occupancy, 0.0),
             semantic_mix: conv(path / "semantic_mix", width, width, 1),
             semantic_prior: conv(path / "semantic_prior", semantics, width, 1),
             semantic_arriving: conv(path / "semantic_arriving", semantics, width, 1),
             semantic_inner: conv(path / "semantic_inner", width, width, 3),
-            semantic_head: small("semantic_head", semantics, -1.0),
+            semantic_head: head(path / "semantic_head", width, semantics, -1.0),
             change_inner: conv(path / "change_inner", width, width, 3),
-            change_head: small("change_head", CHANGE as i64, 0.0),
-            keep_occupancy: per_channel("keep_occupancy", occupancy, 0.5),
-            keep_semantics: per_channel("keep_semantics", semantics, 0.5),
-            swept: per_channel("swept", occupancy, 0.0),
-            arriving_occupancy: per_channel("arriving_occupancy", occupancy, 0.5),
-            arriving_semantics: per_channel("arriving_semantics", semantics, 0.5),
+            change_head: head(path / "change_head", width, CHANGE as i64, 0.0),
+            keep_occupancy: per_channel(path, "keep_occupancy", occupancy, 0.5),
+            keep_semantics: per_channel(path, "keep_semantics", semantics, 0.5),
+            swept: per_channel(path, "swept", occupancy, 0.0),
+            arriving_occupancy: per_channel(path, "arriving_occupancy", occupancy, 0.5),
+            arriving_semantics: per_channel(path, "arriving_semantics", semantics, 0.5),
         }
     }
 }

@@ -9,6 +9,7 @@
 
 use super::layout::{LABELS, Layout, Mirror, OCCUPANCY, SEMANTICS};
 use super::observe_net::{Evidence, ObserveNet, mirrored};
+use super::pool::{Networks, Pool};
 use super::predict::predict;
 use super::push_net::PushNet;
 use super::weights::{Card, load_network};
@@ -19,7 +20,7 @@ use crate::files::sha256_of_file;
 use crate::grid::Grid;
 use crate::{Error, Result};
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::Mutex;
 use tch::nn::VarStore;
 use tch::{Device, Kind, Tensor};
 
@@ -30,36 +31,6 @@ pub struct Cnabu {
     card: Card,
     /// The files that they were read from.
     weights: Weights,
-}
-
-/// The same networks several times, one for each thread that may ask at once: libtorch's tensors may be sent to another
-/// thread but not be used by two.
-#[derive(Debug)]
-pub(super) struct Pool(Vec<Mutex<Networks>>);
-
-#[derive(Debug)]
-pub(super) struct Networks {
-    observe: ObserveNet,
-    /// sigma_m, and the temperature of its probabilities of change.
-    pub(super) push: Option<(PushNet, f32)>,
-    /// They hold the variables, and say on which device.
-    stores: Vec<VarStore>,
-}
-
-impl Pool {
-    /// Networks that no other thread uses now, or the next to be free. Whoever holds them asks nothing of rayon, whose
-    /// thread might take up work that wants them too.
-    pub(super) fn take(&self) -> MutexGuard<'_, Networks> {
-        let free = self.0.iter().find_map(|networks| networks.try_lock().ok());
-        let mine = rayon::current_thread_index().unwrap_or(0) % self.0.len();
-        free.unwrap_or_else(|| self.0[mine].lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
-
-impl Networks {
-    pub(super) fn device(&self) -> Device {
-        self.stores.first().map_or(Device::Cpu, VarStore::device)
-    }
 }
 
 impl Cnabu {

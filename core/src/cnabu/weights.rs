@@ -217,10 +217,22 @@ fn one_line(error: &tch::TchError) -> String {
 /// For weights that are missing, damaged, not finite, or of another network, grid, class list or version.
 pub fn load_network<N: Network>(path: &Path, device: Device) -> Result<(N, VarStore, Card)> {
     let card = Card::read(path, N::NAME)?;
+    let tensors = read_tensors(path)?;
+    let numbers: usize = tensors.values().map(Tensor::numel).sum();
+    if numbers < least_numbers(card.width) {
+        let message = format!("is {}, but the weights are {numbers} numbers, too few for that", card.width);
+        return Err(Error::input(card_path(path), "width", message));
+    }
     let store = VarStore::new(device);
     let net = seeded(0, || N::new(&store.root(), card.width));
-    fill(&store, &read_tensors(path)?, path)?;
+    fill(&store, &tensors, path)?;
     Ok((net, store, card))
+}
+
+/// Numbers that a network has at least: those of its widest convolution, 3 x 3 between eight times `width` channels. A card
+/// that names more than its weights can be would have gigabytes made for nothing.
+fn least_numbers(width: i64) -> usize {
+    9 * (8 * width as usize).pow(2)
 }
 
 /// Copies tensors into the variables of a network; all must be there, of the right shape, and finite.

@@ -3,7 +3,10 @@
 //! ```text
 //! episode.json        what was decided, done and scored; the index of everything else
 //! beliefs/NNN.npz     the belief after NNN actions, 000 the prior
-//! truth/NNN.npz       the truth at the start (000) and after every push
+//! truth/NNN.npz       the truth at the start (000) and after every push, where it is known
+//! frames/NNN.frame    what the camera gave in step NNN, a look; optional
+//! frames/NNN.push     what the arm swept in step NNN, a push; optional
+//! checkpoints/NNN.state   the exact state after the last step, from which a stopped run goes on
 //! episode.rrd, summary.png, notes.json      written by others, removed with the episode they belong to
 //! ```
 //!
@@ -11,12 +14,16 @@
 //! run that is killed at any moment leaves a directory that opens and resumes, or, before its first `episode.json`, one
 //! that a new run may start in.
 
+use super::checkpoint::Checkpoint;
+use super::estimate::Told;
 use super::machine::Episode;
 use super::npz::{self, Precision, StoredTruth};
-use super::record::EpisodeRecord;
+use super::record::{EpisodeRecord, StepRecord};
+use super::told_file;
 use crate::belief::Belief;
 use crate::files::{TEMPORARY, names_in, remove_if_there, write_atomically};
 use crate::grid::Grid;
+use crate::plan::Action;
 use crate::world::TruthMap;
 use crate::{Error, Result};
 use std::fs::{self, File, TryLockError};
@@ -27,6 +34,13 @@ use std::time::Instant;
 const DOCUMENT: &str = "episode.json";
 const BELIEFS: &str = "beliefs";
 const TRUTH: &str = "truth";
+const FRAMES: &str = "frames";
+const CHECKPOINTS: &str = "checkpoints";
+/// The folders of numbered files, and how the names in them end.
+const NUMBERED: [(&str, &str); 5] =
+    [(BELIEFS, "npz"), (TRUTH, "npz"), (FRAMES, "frame"), (FRAMES, "push"), (CHECKPOINTS, "state")];
+/// The folders, each once.
+const FOLDERS: [&str; 4] = [BELIEFS, TRUTH, FRAMES, CHECKPOINTS];
 /// Files of an episode that other parts write.
 const COMPANIONS: [&str; 3] = ["episode.rrd", "summary.png", "notes.json"];
 
@@ -37,6 +51,16 @@ pub enum Overwrite {
     Refuse,
     /// Remove the old episode's files, and no others, and start anew.
     Replace,
+}
+
+/// Whether what belief updates are told (frames, and what the arm swept) is filed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Frames {
+    /// It is; [`infer`](super::infer()) needs it.
+    #[default]
+    Filed,
+    /// It is not.
+    Left,
 }
 
 /// What a path holds, seen by someone who wants to write an episode there.
@@ -59,6 +83,8 @@ pub enum DirectoryState {
 pub struct EpisodeDir {
     path: PathBuf,
     precision: Precision,
+    /// Whether what belief updates are told is filed.
+    frames: Frames,
     grid: OnceLock<Grid>,
     /// Held while this process writes here.
     lock: Option<File>,
@@ -74,7 +100,7 @@ impl EpisodeDir {
         let names = names_in(path)?;
         let numbered = numbered_files(path)?;
         let is_known = |name: &str| {
-            [DOCUMENT, BELIEFS, TRUTH].contains(&name) || COMPANIONS.contains(&name) || name.starts_with(TEMPORARY)
+            name == DOCUMENT || FOLDERS.contains(&name) || COMPANIONS.contains(&name) || name.starts_with(TEMPORARY)
         };
         if names.iter().any(|name| name == DOCUMENT) {
             let is_ours = is_document(&path.join(DOCUMENT))? || !numbered.is_empty();
@@ -86,7 +112,7 @@ impl EpisodeDir {
         }
         Ok(if names.is_empty() {
             DirectoryState::Free
-        } else if numbered.iter().all(|(_, index)| *index == 0) {
+        } else if numbered.iter().all(|file| file.index == 0) {
             DirectoryState::Begun
         } else {
             DirectoryState::Unindexed
@@ -131,13 +157,13 @@ impl EpisodeDir {
     pub fn store<'a>(
         path: impl AsRef<Path>,
         record: &EpisodeRecord,
-        states: impl IntoIterator<Item = (Belief, &'a TruthMap)>,
+        states: impl IntoIterator<Item = (Belief, Option<&'a TruthMap>)>,
     ) -> Result<Self> {
         let directory = Self::create(path, Overwrite::Refuse)?;
         let mut count = 0;
         for (belief, truth) in states {
-            let has_new_truth = record.truth_index(count) == count;
-            directory.write_arrays(count, &belief, has_new_truth.then_some(truth))?;
+            let has_new_truth = record.has_new_truth(count);
+            directory.write_arrays(count, &belief, truth.filter(|_| has_new_truth))?;
             count += 1;
         }
         if count != record.steps.len() + 1 {
@@ -150,6 +176,12 @@ impl EpisodeDir {
     /// Keeps beliefs with the given precision; the default is float16.
     pub fn with_precision(mut self, precision: Precision) -> Self {
         self.precision = precision;
+        self
+    }
+
+    /// Files what belief updates are told, or leaves it; the default is to file it.
+    pub fn with_frames(mut self, frames: Frames) -> Self {
+        self.frames = frames;
         self
     }
 
@@ -179,15 +211,22 @@ impl EpisodeDir {
         directory.lock = lock(path)?;
         directory.remove_leftovers()?;
         let steps = directory.record()?.steps.len();
-        for (part, index) in numbered_files(path)?.into_iter().filter(|(_, index)| *index > steps) {
-            remove_if_there(&path.join(part).join(file_name(index)))?;
+        for file in numbered_files(path)?.into_iter().filter(|file| file.index > steps) {
+            remove_if_there(&file.path)?;
         }
+        directory.frames = if path.join(FRAMES).is_dir() { Frames::Filed } else { Frames::Left };
         directory.precision = directory.read_belief_as_kept(0)?.1;
         Ok(directory)
     }
 
     fn at(path: &Path, lock: Option<File>) -> Self {
-        Self { path: path.to_owned(), precision: Precision::default(), grid: OnceLock::new(), lock }
+        Self {
+            path: path.to_owned(),
+            precision: Precision::default(),
+            frames: Frames::default(),
+            grid: OnceLock::new(),
+            lock,
+        }
     }
 
     /// The directory's path.
@@ -195,17 +234,43 @@ impl EpisodeDir {
         &self.path
     }
 
-    /// Writes what the last action brought: the belief, after a push the truth, and then `episode.json`. Before the
-    /// first action it writes the prior. To be called once after [`Episode::new`] and after every [`Episode::act`].
+    /// Writes what the last action brought: what the belief was told, a checkpoint, the belief, after a push the truth, and
+    /// then `episode.json`. Before the first action it writes the prior. To be called once after [`Episode::new`] and after
+    /// every [`Episode::act`].
     ///
     /// The time it takes is added to the step's `record` seconds, but for the writing of `episode.json` itself.
     pub fn write(&mut self, episode: &mut Episode) -> Result<()> {
         let started = Instant::now();
         let index = episode.record().steps.len();
-        let has_new_truth = episode.record().truth_index(index) == index;
-        self.write_arrays(index, episode.belief(), has_new_truth.then(|| episode.truth()))?;
+        if self.frames == Frames::Filed {
+            self.make_folder(FRAMES)?;
+            if let Some(told) = episode.told().filter(|_| index > 0) {
+                write_atomically(&self.numbered(FRAMES, index, told.extension()), &told.to_bytes())?;
+            }
+        }
+        if let Some(checkpoint) = Checkpoint::of(episode).filter(|_| index > 0) {
+            self.make_folder(CHECKPOINTS)?;
+            write_atomically(&self.checkpoint_path(index), &checkpoint.to_bytes())?;
+        }
+        self.write_arrays(index, episode.belief(), episode.truth().filter(|_| episode.record().has_new_truth(index)))?;
         episode.add_record_seconds(started.elapsed().as_secs_f64());
-        self.write_document(episode.record())
+        self.write_document(episode.record())?;
+        // The one before has done its duty.
+        index.checked_sub(1).map_or(Ok(()), |before| remove_if_there(&self.checkpoint_path(before)))
+    }
+
+    /// Removes the checkpoint of an episode that needs none any more: all of it is written.
+    pub fn finish(&self) -> Result<()> {
+        for file in numbered_files(&self.path)?.iter().filter(|file| file.folder == CHECKPOINTS) {
+            remove_if_there(&file.path)?;
+        }
+        let _ = fs::remove_dir(self.path.join(CHECKPOINTS));
+        Ok(())
+    }
+
+    fn make_folder(&self, name: &str) -> Result<()> {
+        let folder = self.path.join(name);
+        fs::create_dir_all(&folder).map_err(|error| Error::io(&folder, error))
     }
 
     pub(super) fn write_arrays(&self, index: usize, belief: &Belief, truth: Option<&TruthMap>) -> Result<()> {
@@ -253,20 +318,66 @@ impl EpisodeDir {
     /// The truth that holds after `actions` actions: the one filed at the last push until then, or at the start.
     pub fn read_truth(&self, actions: usize) -> Result<StoredTruth> {
         let filed = numbered_files(&self.path)?;
-        let latest = filed.iter().filter(|(part, index)| *part == TRUTH && *index <= actions).map(|(_, index)| *index);
+        let latest = filed.iter().filter(|file| file.folder == TRUTH && file.index <= actions).map(|file| file.index);
         let path = self.truth_path(latest.max().unwrap_or(0));
         let bytes = fs::read(&path).map_err(|error| Error::io(&path, error))?;
         npz::read_truth(&bytes, &path, self.grid()?)
     }
 
+    /// Whether there are frames to infer from.
+    ///
+    /// # Errors
+    /// [`Error::Input`] that says what is missing.
+    pub(super) fn check_frames(&self, record: &EpisodeRecord) -> Result<()> {
+        if !self.path.join(FRAMES).is_dir() {
+            let message = "holds no frames to infer from: it was run with --no-frames, or by a program that filed none";
+            return Err(Error::input(&self.path, "", message));
+        }
+        let missing = record.steps.iter().map(|step| self.told_path(step)).find(|path| !path.is_file());
+        missing.map_or(Ok(()), |path| {
+            Err(Error::input(path, "", "is missing: what is to be inferred from was filed there"))
+        })
+    }
+
+    /// Reads what the belief update of a step was told.
+    pub fn read_told(&self, step: &StepRecord) -> Result<Told> {
+        let path = self.told_path(step);
+        Ok(match step.action {
+            Action::Look { .. } => Told::Frame(told_file::read_frame(&path)?),
+            Action::Manipulate(_) => Told::Push(told_file::read_push(&path, &self.grid()?)?),
+        })
+    }
+
+    /// The checkpoint after the last step; `None` where there is none, or none that can be read.
+    pub(super) fn read_checkpoint(&self, record: &EpisodeRecord) -> Result<Option<Checkpoint>> {
+        let Ok(bytes) = fs::read(self.checkpoint_path(record.steps.len())) else { return Ok(None) };
+        Ok(Checkpoint::from_bytes(&bytes, &self.grid()?))
+    }
+
+    fn told_path(&self, step: &StepRecord) -> PathBuf {
+        let extension = match step.action {
+            Action::Look { .. } => "frame",
+            Action::Manipulate(_) => "push",
+        };
+        self.numbered(FRAMES, step.index, extension)
+    }
+
+    fn checkpoint_path(&self, actions: usize) -> PathBuf {
+        self.numbered(CHECKPOINTS, actions, "state")
+    }
+
+    fn numbered(&self, folder: &str, index: usize, extension: &str) -> PathBuf {
+        self.path.join(folder).join(file_name(index, extension))
+    }
+
     /// Path of the belief after `actions` actions.
     pub fn belief_path(&self, actions: usize) -> PathBuf {
-        self.path.join(BELIEFS).join(file_name(actions))
+        self.numbered(BELIEFS, actions, "npz")
     }
 
     /// Path of the truth that is filed after `actions` actions, if there is one.
     pub fn truth_path(&self, actions: usize) -> PathBuf {
-        self.path.join(TRUTH).join(file_name(actions))
+        self.numbered(TRUTH, actions, "npz")
     }
 
     fn grid(&self) -> Result<Grid> {
@@ -277,7 +388,8 @@ impl EpisodeDir {
     }
 
     fn remove_leftovers(&self) -> Result<()> {
-        for part in [self.path.clone(), self.path.join(BELIEFS), self.path.join(TRUTH)] {
+        let folders = FOLDERS.map(|folder| self.path.join(folder));
+        for part in std::iter::once(self.path.clone()).chain(folders) {
             for name in names_in(&part)?.iter().filter(|name| name.starts_with(TEMPORARY)) {
                 remove_if_there(&part.join(name))?;
             }
@@ -293,47 +405,62 @@ impl EpisodeDir {
         }
         // From the last to the first: what a kill leaves is taken for what it is.
         let mut numbered = numbered_files(&self.path)?;
-        numbered.sort_by_key(|(_, index)| std::cmp::Reverse(*index));
-        for (part, index) in numbered {
-            remove_if_there(&self.path.join(part).join(file_name(index)))?;
+        numbered.sort_by_key(|file| std::cmp::Reverse(file.index));
+        for file in numbered {
+            remove_if_there(&file.path)?;
         }
-        self.remove_leftovers()
+        self.remove_leftovers()?;
+        // Whether these are there says whether frames are filed; what holds a stranger's file stays.
+        for folder in [FRAMES, CHECKPOINTS] {
+            let _ = fs::remove_dir(self.path.join(folder));
+        }
+        Ok(())
     }
 }
 
-fn file_name(index: usize) -> String {
-    format!("{index:03}.npz")
+fn file_name(index: usize, extension: &str) -> String {
+    format!("{index:03}.{extension}")
 }
 
-/// The numbered archives in `beliefs/` and `truth/`.
-fn numbered_files(path: &Path) -> Result<Vec<(&'static str, usize)>> {
+/// A numbered file of an episode.
+struct Numbered {
+    path: PathBuf,
+    folder: &'static str,
+    index: usize,
+}
+
+/// The numbered files of an episode.
+fn numbered_files(path: &Path) -> Result<Vec<Numbered>> {
     let mut found = Vec::new();
-    for part in [BELIEFS, TRUTH] {
-        let directory = path.join(part);
+    for folder in FOLDERS {
+        let directory = path.join(folder);
         if directory.is_dir() {
-            found.extend(names_in(&directory)?.iter().filter_map(|name| index_of(name)).map(|index| (part, index)));
+            let numbered =
+                |name: &String| Some(Numbered { path: directory.join(name), folder, index: index_of(folder, name)? });
+            found.extend(names_in(&directory)?.iter().filter_map(numbered));
         }
     }
     Ok(found)
 }
 
-/// The number in a name that [`file_name`] made.
-fn index_of(name: &str) -> Option<usize> {
-    let index = name.strip_suffix(".npz")?.parse().ok()?;
-    (file_name(index) == name).then_some(index)
+/// The number in a name that [`file_name`] made for a folder.
+fn index_of(folder: &str, name: &str) -> Option<usize> {
+    let (number, extension) = name.split_once('.')?;
+    let index = number.parse().ok()?;
+    (NUMBERED.contains(&(folder, extension)) && file_name(index, extension) == name).then_some(index)
 }
 
-/// The name of something in `beliefs/` or `truth/` that is no episode's.
+/// The name of something in a folder of an episode that is no episode's.
 fn stranger_inside(path: &Path) -> Result<Option<String>> {
-    for part in [BELIEFS, TRUTH] {
-        let directory = path.join(part);
+    for folder in FOLDERS {
+        let directory = path.join(folder);
         if directory.exists() && !directory.is_dir() {
-            return Ok(Some(part.to_owned()));
+            return Ok(Some(folder.to_owned()));
         }
         let names = names_in(&directory)?;
-        let stranger = names.iter().find(|name| index_of(name).is_none() && !name.starts_with(TEMPORARY));
+        let stranger = names.iter().find(|name| index_of(folder, name).is_none() && !name.starts_with(TEMPORARY));
         if let Some(name) = stranger {
-            return Ok(Some(format!("{part}/{name}")));
+            return Ok(Some(format!("{folder}/{name}")));
         }
     }
     Ok(None)

@@ -60,7 +60,7 @@ fn an_episode_stored_at_once_is_the_one_written_step_by_step() {
     let (stepwise, at_once) = (root.path().join("a"), root.path().join("b"));
     written(&stepwise, 3);
     let truths: Vec<TruthMap> = [0, 0, 2, 2].map(synthetic::truth).into();
-    let states = || (0..=3).map(|index| (synthetic::belief(index), &truths[index]));
+    let states = || (0..=3).map(|index| (synthetic::belief(index), Some(&truths[index])));
     EpisodeDir::store(&at_once, &synthetic::record(3), states()).expect("stored");
     let content = |path: &Path| -> Vec<Vec<u8>> { snapshot(path).into_values().collect() };
     assert!(content(&stepwise) == content(&at_once));
@@ -220,7 +220,7 @@ fn a_damaged_log_is_named_with_its_place() {
         assert!(line.contains("line "), "{line}");
     }
     let text = String::from_utf8(whole.clone()).expect("UTF-8");
-    assert!(complain(text.replacen("\"format\": 1", "\"format\": 2", 1).as_bytes()).contains("format: is 2"));
+    assert!(complain(text.replacen("\"format\": 2", "\"format\": 3", 1).as_bytes()).contains("format: is 3"));
     assert!(complain(b"{}").contains("format: is missing"));
     assert!(complain(text.replacen("\"index\": 2", "\"index\": 7", 1).as_bytes()).contains("steps[1].index: is 7"));
     assert!(complain(text.replacen("\"budget\": 4", "\"budget\": 2", 1).as_bytes()).contains("3 steps in a budget"));

@@ -27,17 +27,27 @@ impl EpisodeRecord {
         }
         let head: Head = serde_json::from_str(text).map_err(|error| input_error(path, &error))?;
         match head.format {
-            Some(FORMAT) => {}
+            Some(1..=FORMAT) => {}
             Some(other) => {
-                return Err(Error::input(path, "format", format!("is {other}, this version reads {FORMAT}")));
+                return Err(Error::input(path, "format", format!("is {other}, this version reads 1 to {FORMAT}")));
             }
             None => return Err(Error::input(path, "format", "is missing: not an episode")),
         }
-        let record: Self = serde_json::from_str(text).map_err(|error| input_error(path, &error))?;
+        let mut record: Self = serde_json::from_str(text).map_err(|error| input_error(path, &error))?;
+        record.scene.check_numbers(path)?;
+        if let Err(fault) = record.config.planner.check() {
+            return Err(Error::input(path, "planner", fault.to_string()));
+        }
+        // An older document reads into the same record, and is written as that.
+        record.format = FORMAT;
         for (at, step) in record.steps.iter().enumerate() {
             if step.index != at + 1 {
                 let place = format!("steps[{at}].index");
                 return Err(Error::input(path, place, format!("is {}, expected {}", step.index, at + 1)));
+            }
+            if step.judgement.is_some() != record.has_truth() {
+                let message = "is judged and the prior is not, or the other way round";
+                return Err(Error::input(path, format!("steps[{at}]"), message));
             }
             if step.action != step.decision.action {
                 return Err(Error::input(path, format!("steps[{at}].action"), "is not the action of its decision"));
@@ -47,6 +57,9 @@ impl EpisodeRecord {
             let message = format!("{} steps in a budget of {}", record.steps.len(), record.config.budget);
             return Err(Error::input(path, "steps", message));
         }
+        // Older versions did not take the rule down with every decision: it was the episode's.
+        let rule = record.config.rule();
+        record.steps.iter_mut().for_each(|step| _ = step.decision.rule.get_or_insert(rule));
         Ok(record)
     }
 }
@@ -146,3 +159,7 @@ impl serde_json::ser::Formatter for Lines {
 #[cfg(test)]
 #[path = "document_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "format_tests.rs"]
+mod format_tests;

@@ -13,7 +13,7 @@ fn the_document_has_the_published_members() {
     for key in ["format", "scene", "policy", "belief", "seed", "budget", "version", "steps"] {
         assert!(document.get(key).is_some(), "{key}");
     }
-    assert_eq!(document["format"], 1);
+    assert_eq!(document["format"], 2);
     assert_eq!(document["policy"], "random-push-5-blind");
     assert_eq!(document["seed"], u64::MAX);
     let look = &document["steps"][0];
@@ -53,6 +53,18 @@ fn lines_stand_for_parts_of_steps() {
 }
 
 #[test]
+fn a_decision_of_an_older_version_takes_its_rule_from_the_episode_and_a_newer_one_keeps_its_own() {
+    let mut record = synthetic::record(2);
+    record.steps[0].decision.rule = None;
+    let text = record.to_json();
+    assert_eq!(text.matches("\"rule\": {").count(), 1);
+    let read = EpisodeRecord::from_json(&text, Path::new("e.json")).expect("reads");
+    let kept = record.steps[1].decision.rule;
+    assert!(kept.is_some() && kept != Some(record.config.rule()));
+    assert_eq!([0, 1].map(|at| read.steps[at].decision.rule), [Some(record.config.rule()), kept]);
+}
+
+#[test]
 fn an_action_that_is_not_the_decision_s_is_refused() {
     let mut record = synthetic::record(2);
     record.steps[0].action = record.steps[1].action;
@@ -81,6 +93,33 @@ fn candidates_of_before_there_were_other_skills_are_pushes() {
     assert_eq!(EpisodeRecord::from_json(&document.to_string(), Path::new("e.json")).expect("reads"), written);
 }
 
+/// What is said of the document with one value in another's place.
+fn refusal(place: &str, value: Value) -> String {
+    let mut document: Value = serde_json::from_str(&synthetic::record(2).to_json()).expect("JSON");
+    *document.pointer_mut(place).unwrap_or_else(|| panic!("{place} is not there")) = value;
+    EpisodeRecord::from_json(&document.to_string(), Path::new("e.json")).expect_err("refuses").to_string()
+}
+
+#[test]
+fn a_shelf_of_kilometres_in_an_episode_asked_for_all_memory() {
+    for size in [1e6, 1e30] {
+        let line = refusal("/scene/shelf/size", serde_json::json!([size, 0.4, 0.4]));
+        assert!(line.starts_with("e.json: shelf size "), "{line}");
+    }
+    let line = refusal("/scene/shelf/voxel_m", 1e-9.into());
+    assert!(line.contains("voxel_m = "), "{line}");
+    let line = refusal("/scene/robot/base", serde_json::json!([0.0, 1e30, 0.0]));
+    assert!(line.contains("robot base"), "{line}");
+}
+
+#[test]
+fn settings_out_of_range_in_an_episode_were_taken() {
+    let line = refusal("/planner/candidates", u64::MAX.into());
+    assert!(line.starts_with("e.json: planner: --candidates "), "{line}");
+    let line = refusal("/planner/quiet_steps", 100_000.into());
+    assert!(line.contains("--quiet-steps 100000: must be 0 to 1000"), "{line}");
+}
+
 proptest! {
     #[test]
     fn every_number_is_read_back_to_the_bit(
@@ -93,7 +132,7 @@ proptest! {
         let mut record = synthetic::record(2);
         record.config.planner.gamma = gamma;
         record.steps[0].decision.gains = gains.clone();
-        record.steps[1].scores.entropy_nats = entropy;
+        record.steps[1].judgement.as_mut().expect("a truth").scores.entropy_nats = entropy;
         let push = crate::skill::Push { start, direction_deg: gains[0], length_m };
         record.steps[1].action = crate::plan::Action::Manipulate(push.into());
         record.steps[1].decision.action = record.steps[1].action;

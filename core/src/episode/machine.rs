@@ -1,27 +1,29 @@
 //! The episode as a state machine.
 
-use super::npz::StoredTruth;
+use super::estimate::{Estimate, Told, sense};
+use super::judgement::{Judgement, Prior, entropy_nats};
 use super::record::{
     EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
+use super::stopwatch::Stopwatch;
 use crate::arm::{Arm, ArmTool, HandPose, Motion, PhasedMotion};
-use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction, Sightings, look};
-use crate::camera::{self, Image, MapObservation, NoiseModel, View, ViewArray, ViewId};
+use crate::belief::{Belief, BeliefUpdate};
+use crate::camera::{Frame, MapObservation, Sensed, View, ViewArray, ViewId, project};
+use crate::environment::{Environment, Simulated};
 use crate::grid::{Grid, VoxelSet};
 use crate::made_by::{Build, MadeBy};
-use crate::plan::{self, Action, Counted, Decision, History, Reason, Situation};
+use crate::plan::{self, Action, Decision, History, Situation};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
-use crate::score::{Scores, object_verdicts};
 use crate::skill::{ArmClearance, Candidate, Counterfactual, Ground, Manipulation};
-use crate::world::{ManipulationOutcome, TruthMap, World};
+use crate::world::{ManipulationOutcome, TruthMap};
 use crate::{Error, Result};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// A running episode. A clone is a branch: both go on independently from the same state.
-#[derive(Clone)]
+mod log;
+
+/// A running episode.
 pub struct Episode {
     catalog: Arc<Catalog>,
     update: Arc<dyn BeliefUpdate>,
@@ -33,47 +35,58 @@ pub struct Episode {
     hand: Option<HandPose>,
     /// Views that are not offered.
     unreachable: Arc<Vec<ViewId>>,
-    world: World,
-    bodies: Arc<Vec<Body>>,
-    belief: Arc<Belief>,
-    truth: Arc<TruthMap>,
+    /// Where images come from and pushes go.
+    environment: Box<dyn Environment>,
+    /// The truth of a log that stands in place of the environment's until the next push.
+    filed_truth: Option<Arc<TruthMap>>,
+    estimate: Estimate,
     history: History,
-    /// What looks have seen and no push may have changed since.
-    sightings: Arc<Sightings>,
     record: EpisodeRecord,
     deciding: Stopwatch,
+    /// What the last belief update was told.
+    told: Option<Told>,
 }
 
 impl Episode {
-    /// Sets the scene up (settled), with the uniform belief.
+    /// Sets the scene up in simulation (settled), with the uniform belief.
     ///
     /// # Errors
-    /// For a belief update that is not the one the configuration names or not made for the scene's grid, an unknown view
-    /// array, a budget of zero, and a scene that gives no bodies.
+    /// Those of [`Episode::within`], and for a scene that gives no bodies.
     pub fn new(
         scene: Scene,
         catalog: Arc<Catalog>,
         config: EpisodeConfig,
         update: Arc<dyn BeliefUpdate>,
     ) -> Result<Self> {
-        if config.belief != update.name() {
-            let message = format!("the episode is about belief `{}`, not `{}`", config.belief, update.name());
+        // Before the scene is given the time to settle.
+        check(&scene, &config, &*update)?;
+        let environment = Box::new(Simulated::new(&scene, &catalog)?);
+        Self::within(environment, scene, catalog, config, update)
+    }
+
+    /// An episode in any environment, with the uniform belief; `scene` says which shelf and robot it is about.
+    ///
+    /// # Errors
+    /// For a belief update that is not the one the configuration names or not made for the scene's grid, an unknown view
+    /// array, a budget of zero, and a policy that knows the future where nothing is simulated.
+    pub fn within(
+        environment: Box<dyn Environment>,
+        scene: Scene,
+        catalog: Arc<Catalog>,
+        config: EpisodeConfig,
+        update: Arc<dyn BeliefUpdate>,
+    ) -> Result<Self> {
+        check(&scene, &config, &*update)?;
+        let policy = config.policy;
+        if policy.knows_the_future() && environment.simulated().is_none() {
+            let message = format!("policy {policy} asks what would really happen, which only a simulated shelf tells");
             return Err(Error::Usage(message));
         }
-        if config.budget == 0 {
-            return Err(Error::Usage("the budget must be at least one action".to_owned()));
-        }
-        update.check_grid(&scene.grid())?;
         let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         let hands = Arc::new(views.hand_poses(&arm));
         let unreachable = Arc::new(views.unreachable(&hands));
-        let mut world = World::new(scene.shelf, scene.bodies(&catalog)?);
-        world.settle();
-        let bodies = Arc::new(world.bodies());
-        let grid = scene.grid();
-        let belief = Arc::new(Belief::uniform(grid));
-        let truth = Arc::new(TruthMap::of(&grid, &bodies));
+        let estimate = Estimate::uniform(&scene.grid());
         let threads = rayon::current_num_threads();
         let record = EpisodeRecord {
             format: FORMAT,
@@ -82,7 +95,7 @@ impl Episode {
             also_made_by: Vec::new(),
             scene,
             config,
-            prior: Scores::of(&belief, &truth),
+            prior: Prior::of(&estimate.belief, environment.truth()),
             steps: Vec::new(),
         };
         Ok(Self {
@@ -93,14 +106,33 @@ impl Episode {
             arm,
             hands,
             unreachable,
-            world,
-            bodies,
-            belief,
-            truth,
+            environment,
+            filed_truth: None,
+            estimate,
             history: History::default(),
-            sightings: Arc::new(Sightings::none(&grid)),
             record,
             deciding: Stopwatch::default(),
+            told: None,
+        })
+    }
+
+    /// A copy that goes on independently from the same state, where the environment can have one.
+    pub fn branch(&self) -> Option<Self> {
+        Some(Self {
+            catalog: self.catalog.clone(),
+            update: self.update.clone(),
+            views: self.views.clone(),
+            arm: self.arm.clone(),
+            hands: self.hands.clone(),
+            hand: self.hand.clone(),
+            unreachable: self.unreachable.clone(),
+            environment: self.environment.branch()?,
+            filed_truth: self.filed_truth.clone(),
+            estimate: self.estimate.clone(),
+            history: self.history.clone(),
+            record: self.record.clone(),
+            deciding: self.deciding.clone(),
+            told: self.told.clone(),
         })
     }
 
@@ -115,16 +147,21 @@ impl Episode {
     /// What the policy would do now, and what it weighed. Changes nothing; the same state decides the same.
     pub fn decide(&self) -> Decision {
         let started = Instant::now();
-        let really_look = |view: ViewId| match self.views.view(view) {
-            Some(view) => {
-                let mut sightings = (*self.sightings).clone();
-                look(&*self.update, &self.belief, &self.observe(view).1, &mut sightings)
+        let really_look = |view: ViewId| {
+            let mut after = self.estimate.clone();
+            if let (Some(view), Some(shelf)) = (self.views.view(view), self.environment.simulated()) {
+                let shoot = |view: &View| Ok(shelf.frame_from(view, &self.views.intrinsics));
+                if let Ok((_, frame)) = sense(&self.record, view, shoot) {
+                    after.look(&*self.update, &project(&frame, &self.record.scene.shelf));
+                }
             }
-            None => (*self.belief).clone(),
+            (*after.belief).clone()
         };
-        let really_push = |motions: &[PhasedMotion]| self.counterfactual().of_each(motions, &|| ());
+        let really_push = |motions: &[PhasedMotion]| {
+            self.counterfactual().map_or_else(Vec::new, |known| known.of_each(motions, &|| ()))
+        };
         let situation = Situation {
-            belief: &self.belief,
+            belief: &self.estimate.belief,
             update: &*self.update,
             views: &self.views,
             arm: &self.arm,
@@ -148,10 +185,11 @@ impl Episode {
     /// # Errors
     /// [`Error::Usage`] past the budget, for a view that the array does not have, for a manipulation that is no finite motion
     /// or that the arm cannot carry out, and for one after an object was dropped. The episode is then as it was.
-    pub fn act(&mut self, decision: Decision) -> Result<StepOutcome> {
+    pub fn act(&mut self, mut decision: Decision) -> Result<StepOutcome> {
         if self.is_finished() {
             return Err(Error::Usage(format!("the budget of {} actions is used up", self.record.config.budget)));
         }
+        decision.rule.get_or_insert(self.record.config.rule());
         let seconds = StepSeconds { decide: self.deciding.take(), ..StepSeconds::default() };
         let action = decision.action;
         match action {
@@ -166,21 +204,21 @@ impl Episode {
             return Err(Error::Usage(format!("view {} of {views} in {}", view.0, self.views.name)));
         };
         let started = Instant::now();
-        let (image, observation) = self.observe(&view);
+        let (sensed, frame, observation) = self.observe(&view)?;
         let motion = self.carry(self.hands.get(usize::from(view.id.0)).cloned().flatten());
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
-        let sightings = Arc::make_mut(&mut self.sightings);
-        self.belief = Arc::new(look(&*self.update, &self.belief, &observation, sightings));
+        self.estimate.look(&*self.update, &observation);
+        self.told = Some(Told::Frame(sensed));
         let motion_s = motion.as_ref().map_or(0.0, Motion::duration_s);
         let happened = Happened { motion_s, ..Happened::default() };
         let record = self.file(decision, happened, started, seconds);
         Ok(StepOutcome {
             record,
-            image: Some(image),
+            frame: Some(frame),
             observation: Some(observation),
-            intervention: None,
+            swept: None,
             prediction: None,
             manipulated: None,
             motion,
@@ -206,23 +244,17 @@ impl Episode {
         let started = Instant::now();
         let arm = self.arm.clone();
         let motion = self.motion_for(&arm, &mut decision, &manipulation)?;
+        let outcome = self.environment.carry_out(&arm.arm, &motion)?;
         let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
-        let outcome = self.world.execute(&arm.arm, &motion);
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         // The arm knows how far it came: what it did not sweep is not believed to be free.
-        let intervention = manipulation.done(&outcome, &arm.arm, &self.belief);
-        let prediction = self.predict(&intervention, decision.reason);
-        match &prediction {
-            Some(prediction) => {
-                Arc::make_mut(&mut self.belief).apply(prediction);
-                Arc::make_mut(&mut self.sightings).forget_changed(prediction);
-            }
-            None => self.sightings = Arc::new(Sightings::none(&self.grid())),
-        }
-        self.bodies = Arc::new(self.world.bodies());
-        self.truth = Arc::new(TruthMap::of(&self.grid(), &self.bodies));
+        let swept = manipulation.done(&outcome, &arm.arm, &self.grid());
+        let is_predicted = self.record.config.is_predicted(decision.reason);
+        let prediction = self.estimate.manipulate(&*self.update, &swept, is_predicted);
+        self.told = Some(Told::Manipulation(swept.clone()));
+        self.filed_truth = None;
         let happened = Happened {
             dropped: outcome.dropped.clone(),
             displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
@@ -232,9 +264,9 @@ impl Episode {
         let record = self.file(decision, happened, started, seconds);
         Ok(StepOutcome {
             record,
-            image: None,
+            frame: None,
             observation: None,
-            intervention: Some(intervention),
+            swept: Some(swept),
             prediction,
             manipulated: Some(outcome),
             motion: Some(to_wait.then(&motion.whole(&arm.arm))),
@@ -252,7 +284,7 @@ impl Episode {
         let motion = match kept {
             Some(motion) => motion,
             None => {
-                let clearance = ArmClearance::new(arm, &self.belief);
+                let clearance = ArmClearance::new(arm, &self.estimate.belief);
                 let mut rng = stream(self.record.config.seed, "push by hand", self.record.steps.len() as u64);
                 skill.plan(&clearance, &mut rng).map_err(|reason| {
                     let (name, reason) = (wanted.kind().name(), wanted.against(&reason));
@@ -293,22 +325,12 @@ impl Episode {
         format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
     }
 
-    /// The prediction that becomes the belief after a manipulation, for policies that predict them and for those that a
-    /// person chose; `None` for the other policies.
-    fn predict(&self, intervention: &Intervention, reason: Reason) -> Option<Prediction> {
-        (self.record.config.policy.predicts_pushes() || reason == Reason::Manual)
-            .then(|| self.update.predict(&self.belief, std::slice::from_ref(intervention)).pop())
-            .flatten()
-    }
-
-    /// What a view sees now, noise included: the oracle sees the very image that a look would give.
-    fn observe(&self, view: &View) -> (Image, MapObservation) {
-        let (shelf, intrinsics) = (self.world.shelf(), &self.views.intrinsics);
-        let noise = self.record.config.noise.unwrap_or(NoiseModel::OFF);
-        let step = self.record.steps.len() as u64 + 1;
-        let image = noise.take(shelf, &self.bodies, view, intrinsics, self.record.config.seed, step);
-        let observation = camera::project(&image, view, intrinsics, shelf);
-        (image, observation)
+    /// What a view gives now, without noise in its pixels; what the belief is told of it; and what that says of the grid.
+    fn observe(&mut self, view: &View) -> Result<(Sensed, Frame, MapObservation)> {
+        let shoot = |view: &View| self.environment.frame(view, &self.views.intrinsics);
+        let (sensed, frame) = sense(&self.record, view, shoot)?;
+        let observation = project(&frame, &self.record.scene.shelf);
+        Ok((sensed, frame, observation))
     }
 
     /// Scores the new state and files the step.
@@ -320,17 +342,20 @@ impl Episode {
         mut seconds: StepSeconds,
     ) -> StepRecord {
         self.history.record(&decision, !happened.dropped.is_empty());
-        let scores = Scores::of(&self.belief, &self.truth);
-        let objects = object_verdicts(&self.belief, &self.truth, &self.catalog);
+        let judge = |truth: &TruthMap| {
+            let dropped = happened.dropped.iter().map(|id| self.name(*id)).collect();
+            Judgement::of(&self.estimate.belief, truth, &self.catalog, dropped, happened.displacement_m)
+        };
+        let judgement = self.truth().map(judge);
+        let scored = judgement.as_ref().map(|judgement| judgement.scores.entropy_nats);
+        let entropy_nats = scored.unwrap_or_else(|| entropy_nats(&self.estimate.belief));
         seconds.update = updating.elapsed().as_secs_f64();
         let step = StepRecord {
             index: self.record.steps.len() + 1,
             action: decision.action,
             decision,
-            scores,
-            objects,
-            dropped: happened.dropped.iter().map(|id| self.name(*id)).collect(),
-            displacement_m: happened.displacement_m,
+            entropy_nats,
+            judgement,
             motion_s: happened.motion_s,
             push: happened.push,
             seconds,
@@ -346,36 +371,15 @@ impl Episode {
         }
     }
 
-    /// Takes the seconds and the version of a log whose actions this episode has repeated.
-    pub(super) fn adopt_log(&mut self, logged: EpisodeRecord) {
-        self.record = logged;
-    }
-
-    /// Replaces the repeated prior or last step by the one of a log, with belief and truth from the files.
-    pub(super) fn adopt_state(&mut self, logged: &EpisodeRecord, belief: Belief, truth: StoredTruth) {
-        self.record.prior = logged.prior;
-        if let Some(step) = self.record.steps.last_mut() {
-            *step = logged.steps[step.index - 1].clone();
-        }
-        self.belief = Arc::new(belief);
-        // Which object stands where is not filed, so outlines on the floor stay those of the repeated truth.
-        self.truth = Arc::new(TruthMap {
-            dims: truth.dims,
-            occupancy: truth.occupancy,
-            labels: truth.labels,
-            objects: self.truth.objects.clone(),
-        });
-    }
-
     /// Whether the budget is used up.
     pub fn is_finished(&self) -> bool {
         self.record.steps.len() >= self.record.config.budget
     }
 
-    /// The voxels that do not count as a gain, where only unseen ones do: those that looks have seen and that no push
-    /// has probably changed since.
-    pub fn seen(&self) -> Option<&VoxelSet> {
-        (self.record.config.planner.counted == Counted::Unseen).then_some(self.sightings.seen())
+    /// The voxels that looks have seen and that no push has probably changed since: where only unseen ones count as a
+    /// gain, these do not.
+    pub fn seen(&self) -> &VoxelSet {
+        self.estimate.sightings.seen()
     }
 
     /// The record so far, as `episode.json` keeps it.
@@ -385,27 +389,36 @@ impl Episode {
 
     /// The belief now.
     pub fn belief(&self) -> &Belief {
-        &self.belief
+        &self.estimate.belief
     }
 
-    /// The truth now.
-    pub fn truth(&self) -> &TruthMap {
-        &self.truth
+    /// The truth now, if it is known.
+    pub fn truth(&self) -> Option<&TruthMap> {
+        self.filed_truth.as_deref().or_else(|| self.environment.truth())
     }
 
-    /// The bodies where they are now, dropped ones left out.
+    /// The bodies where they are now, dropped ones left out; none where nobody knows.
     pub fn bodies(&self) -> Vec<Body> {
-        self.bodies.to_vec()
+        self.simulated().map_or_else(Vec::new, |shelf| shelf.bodies().to_vec())
     }
 
-    /// The world now.
-    pub fn world(&self) -> &World {
-        &self.world
+    /// The simulation, where it is one.
+    pub fn simulated(&self) -> Option<&Simulated> {
+        self.environment.simulated()
+    }
+
+    pub(super) fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    /// What the last belief update was told; `None` before the first action.
+    pub fn told(&self) -> Option<&Told> {
+        self.told.as_ref()
     }
 
     /// The grid of belief and truth.
     pub fn grid(&self) -> Grid {
-        self.belief.grid
+        self.estimate.belief.grid
     }
 
     /// The candidate views.
@@ -441,17 +454,18 @@ impl Episode {
         &self.catalog
     }
 
-    /// The world as it stands, for telling what pushes would really do.
-    pub fn counterfactual(&self) -> Counterfactual<'_> {
-        Counterfactual::new(&self.world, &self.arm, &self.views, self.sightings.seen())
+    /// The world as it stands, for telling what pushes would really do; `None` where it is not simulated.
+    pub fn counterfactual(&self) -> Option<Counterfactual<'_>> {
+        let world = self.simulated()?.world();
+        Some(Counterfactual::new(world, &self.arm, &self.views, self.estimate.sightings.seen()))
     }
 
     /// The candidates that a decision to be made now draws, whatever the policy makes of them.
     pub fn draw_candidates(&self) -> Vec<Candidate> {
         let config = &self.record.config;
         let actions = self.history.actions.len();
-        let ground =
-            Ground { belief: &self.belief, seen: self.seen(), arm: &self.arm, sampler: config.planner.push_sampler };
+        let (seen, sampler) = (config.planner.counted.left_out(self.seen()), config.planner.push_sampler);
+        let ground = Ground { belief: self.belief(), seen, arm: &self.arm, sampler };
         plan::draw_candidates(&config.planner, &ground, config.seed, actions)
     }
 
@@ -466,6 +480,19 @@ impl Episode {
     }
 }
 
+/// Whether an episode can be begun.
+fn check(scene: &Scene, config: &EpisodeConfig, update: &dyn BeliefUpdate) -> Result<()> {
+    if config.belief != update.name() {
+        let message = format!("the episode is about belief `{}`, not `{}`", config.belief, update.name());
+        return Err(Error::Usage(message));
+    }
+    if config.budget == 0 {
+        return Err(Error::Usage("the budget must be at least one action".to_owned()));
+    }
+    update.check_grid(&scene.grid())?;
+    ViewArray::named(&config.views).map(drop)
+}
+
 /// What an action brought beside its belief.
 #[derive(Default)]
 struct Happened {
@@ -475,26 +502,10 @@ struct Happened {
     push: Option<PushReport>,
 }
 
-/// Seconds that deciding took, kept from `decide`, which changes nothing else, to `act`.
-#[derive(Debug, Default)]
-struct Stopwatch(AtomicU64);
-
-impl Stopwatch {
-    fn set(&self, seconds: f64) {
-        self.0.store(seconds.to_bits(), Ordering::Relaxed);
-    }
-
-    fn take(&self) -> f64 {
-        f64::from_bits(self.0.swap(0, Ordering::Relaxed))
-    }
-}
-
-impl Clone for Stopwatch {
-    fn clone(&self) -> Self {
-        Self(AtomicU64::new(self.0.load(Ordering::Relaxed)))
-    }
-}
-
 #[cfg(test)]
 #[path = "machine_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "environment_tests.rs"]
+mod environment_tests;

@@ -1,12 +1,13 @@
 //! `beliefs/NNN.npz` and `truth/NNN.npz`: NumPy archives of a belief and of a truth.
 //!
 //! `numpy.load` reads them: a belief has `occupancy` `[W, D, H, 2]` (a_occ, a_free) and `semantics` `[W, D, 15]`, little
-//! endian float16 or float32; a truth has `occupancy` `[W, D, H]` and `labels` `[W, D]`, uint8. Archives are deflated at
-//! the fastest level and carry no time of day: the same arrays make the same bytes.
+//! endian float16 or float32; a truth has `occupancy` `[W, D, H]` and `labels` `[W, D]`, uint8, and `objects` `[W, D]`,
+//! uint16. Archives are deflated at the fastest level and carry no time of day: the same arrays make the same bytes.
 
 use crate::belief::Belief;
 use crate::grid::Grid;
 use crate::scene::CLASS_COUNT;
+use crate::wall::guarded;
 use crate::world::TruthMap;
 use crate::{Error, Result};
 use half::f16;
@@ -14,8 +15,13 @@ use half::slice::HalfFloatSliceExt;
 use npyz::WriterBuilder;
 use npyz::zip::write::FileOptions;
 use npyz::zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
-use std::io::{Cursor, Read, Write};
+use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
+
+/// No header of a `.npy` is longer, bytes.
+const MAX_NPY_HEADER: u64 = 1 << 16;
+/// No number of a `.npy` that is read is longer, bytes.
+const LARGEST_NUMBER: u64 = 8;
 
 /// How a belief's evidence is kept in a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,11 +59,24 @@ pub struct StoredTruth {
     pub occupancy: Vec<u8>,
     /// Class of the tallest occupied voxel above a floor cell, else background.
     pub labels: Vec<u8>,
+    /// Object with the tallest occupied voxel above a floor cell, [`u16::MAX`] where none; not in files of programs before
+    /// format 2 of `episode.json`.
+    pub objects: Option<Vec<u16>>,
 }
 
 impl From<&TruthMap> for StoredTruth {
     fn from(truth: &TruthMap) -> Self {
-        Self { dims: truth.dims, occupancy: truth.occupancy.clone(), labels: truth.labels.clone() }
+        let (occupancy, labels) = (truth.occupancy.clone(), truth.labels.clone());
+        Self { dims: truth.dims, occupancy, labels, objects: Some(truth.objects.clone()) }
+    }
+}
+
+impl StoredTruth {
+    /// The whole map; what is asked for the objects if the file does not tell, and if nobody does there are none.
+    pub fn into_map(self, objects: impl FnOnce() -> Option<Vec<u16>>) -> TruthMap {
+        let nobody = || vec![u16::MAX; self.labels.len()];
+        let objects = self.objects.or_else(objects).unwrap_or_else(nobody);
+        TruthMap { dims: self.dims, occupancy: self.occupancy, labels: self.labels, objects }
     }
 }
 
@@ -86,6 +105,7 @@ pub fn truth_archive(truth: &TruthMap) -> Vec<u8> {
     let mut archive = Archive::new();
     archive.add("occupancy", &[w, d, h], &truth.occupancy);
     archive.add("labels", &[w, d], &truth.labels);
+    archive.add("objects", &[w, d], &truth.objects);
     archive.finish()
 }
 
@@ -109,19 +129,24 @@ pub fn read_truth(bytes: &[u8], path: &Path, grid: Grid) -> Result<StoredTruth> 
     if let Some(label) = labels.iter().find(|label| usize::from(**label) >= CLASS_COUNT) {
         return Err(Error::input(path, "array labels", format!("class {label} of {CLASS_COUNT}")));
     }
-    Ok(StoredTruth { dims: grid.dims, occupancy, labels })
+    let objects = archive.has("objects").then(|| archive.words("objects", &[w, d])).transpose()?;
+    Ok(StoredTruth { dims: grid.dims, occupancy, labels, objects })
 }
 
 /// Checks that the file is a whole archive with the named arrays, without reading them.
 pub fn check_archive(path: &Path, arrays: &[&str]) -> Result<()> {
     let file = std::fs::File::open(path).map_err(|error| Error::io(path, error))?;
-    let mut zip = ZipArchive::new(std::io::BufReader::new(file))
-        .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))?;
+    let mut zip = opened(std::io::BufReader::new(file), path)?;
     for name in arrays {
         zip.by_name(&npyz::npz::file_name_from_array_name(name))
             .map_err(|error| Error::input(path, format!("array {name}"), error.to_string()))?;
     }
     Ok(())
+}
+
+fn opened<R: Read + Seek>(from: R, path: &Path) -> Result<ZipArchive<R>> {
+    guarded(|| ZipArchive::new(from).map_err(|error| error.to_string()))
+        .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))
 }
 
 /// An archive being written into memory.
@@ -167,18 +192,21 @@ struct OpenArchive<'a> {
 
 impl<'a> OpenArchive<'a> {
     fn new(bytes: &'a [u8], path: &'a Path) -> Result<Self> {
-        let zip = ZipArchive::new(Cursor::new(bytes))
-            .map_err(|error| Error::input(path, "", format!("not a whole NumPy archive ({error})")))?;
-        Ok(Self { zip, path })
+        Ok(Self { zip: opened(Cursor::new(bytes), path)?, path })
     }
 
-    /// The bytes of an array's `.npy`, checksum verified.
-    fn entry(&mut self, name: &str) -> Result<Vec<u8>> {
+    /// The bytes of an array's `.npy`, checksum verified. An archive may promise more than memory holds: no more is
+    /// unpacked than an array of so many numbers can have.
+    fn entry(&mut self, name: &str, numbers: usize) -> Result<Vec<u8>> {
         let fail = |message: String| Error::input(self.path, format!("array {name}"), message);
-        let mut entry =
+        let entry =
             self.zip.by_name(&npyz::npz::file_name_from_array_name(name)).map_err(|error| fail(error.to_string()))?;
+        let most = MAX_NPY_HEADER + LARGEST_NUMBER * numbers as u64;
         let mut npy = Vec::new();
-        entry.read_to_end(&mut npy).map_err(|error| fail(error.to_string()))?;
+        entry.take(most + 1).read_to_end(&mut npy).map_err(|error| fail(error.to_string()))?;
+        if npy.len() as u64 > most {
+            return Err(fail(format!("has more than the {numbers} numbers that the scene's grid needs")));
+        }
         Ok(npy)
     }
 
@@ -189,9 +217,9 @@ impl<'a> OpenArchive<'a> {
         shape: &[usize],
         read: impl FnOnce(npyz::NpyFile<&[u8]>) -> std::io::Result<T>,
     ) -> Result<T> {
-        let npy = self.entry(name)?;
+        let npy = self.entry(name, shape.iter().product())?;
         let fail = |message: String| Error::input(self.path, format!("array {name}"), message);
-        let file = npyz::NpyFile::new(&npy[..]).map_err(|error| fail(error.to_string()))?;
+        let file = guarded(|| npyz::NpyFile::new(&npy[..]).map_err(|error| error.to_string())).map_err(fail)?;
         let found: Vec<usize> = file.shape().iter().map(|n| *n as usize).collect();
         if found != shape {
             return Err(fail(format!("has shape {found:?} where the scene's grid needs {shape:?}")));
@@ -199,7 +227,16 @@ impl<'a> OpenArchive<'a> {
         if file.order() != npyz::Order::C {
             return Err(fail("is in Fortran order".to_owned()));
         }
-        read(file).map_err(|error| fail(error.to_string()))
+        guarded(|| read(file).map_err(|error| error.to_string())).map_err(fail)
+    }
+
+    fn has(&self, name: &str) -> bool {
+        let file = npyz::npz::file_name_from_array_name(name);
+        self.zip.file_names().any(|name| *name == file)
+    }
+
+    fn words(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u16>> {
+        self.array(name, shape, |file| file.into_vec::<u16>())
     }
 
     fn bytes(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u8>> {
@@ -221,5 +258,26 @@ impl<'a> OpenArchive<'a> {
             return Err(Error::input(path, place, format!("entry {at} is {}, not evidence", values[at])));
         }
         Ok((values, precision))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_archive_that_unpacks_to_more_than_its_grid_filled_the_memory() {
+        let grid = Grid { voxel_m: 0.01, dims: [4, 3, 2], origin: [0.0; 3] };
+        let mut archive = Archive::new();
+        archive.add("occupancy", &[4, 3, 2, 2], &[1.0_f32; 48]);
+        archive.add("semantics", &[4, 3, CLASS_COUNT], &[1.0_f32; 12 * CLASS_COUNT]);
+        assert!(read_belief(&archive.finish(), Path::new("a.npz"), grid).is_ok());
+        // A thousandth of it on the disk.
+        let mut archive = Archive::new();
+        archive.add("occupancy", &[48 << 17], &vec![0.0_f32; 48 << 17]);
+        let bytes = archive.finish();
+        assert!(bytes.len() < 1 << 18);
+        let line = read_belief(&bytes, Path::new("a.npz"), grid).expect_err("refuses").to_string();
+        assert_eq!(line, "a.npz: array occupancy: has more than the 48 numbers that the scene's grid needs");
     }
 }

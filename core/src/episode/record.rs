@@ -1,17 +1,20 @@
 //! What is kept of an episode: its configuration, its steps, and `episode.json` as a whole.
 
+use super::judgement::{Judgement, Prior, RawJudgement};
 use crate::arm::Motion;
-use crate::belief::{BeliefUpdate, Intervention, Prediction};
-use crate::camera::{Image, MapObservation, NoiseModel};
+use crate::belief::{BeliefUpdate, Prediction};
+use crate::camera::{Frame, MapObservation, NoiseModel};
 use crate::made_by::MadeBy;
-use crate::plan::{Action, Decision, PlannerSettings, PolicyKind};
+use crate::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, Rule};
 use crate::scene::Scene;
 use crate::score::{ObjectVerdict, Scores};
+use crate::skill::SweptManipulation;
 use crate::world::ManipulationOutcome;
 use serde::{Deserialize, Serialize};
 
-/// The format number of `episode.json`.
-pub const FORMAT: u32 = 1;
+/// The format number of `episode.json`. In format 1, which is still read, every episode had a truth, and `entropy_nats`
+/// stood in its scores alone.
+pub const FORMAT: u32 = 2;
 
 /// What an episode is run with, beside its scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -31,6 +34,19 @@ pub struct EpisodeConfig {
     /// What the camera gets wrong; nothing unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseModel>,
+}
+
+impl EpisodeConfig {
+    /// What its decisions follow.
+    pub fn rule(&self) -> Rule {
+        Rule { policy: self.policy, settings: self.planner }
+    }
+
+    /// Whether a push that was chosen for a reason is predicted into the belief: that of a policy that predicts pushes, and
+    /// whatever a person chose. After the others the belief stays as it is.
+    pub(super) fn is_predicted(&self, reason: Reason) -> bool {
+        self.policy.predicts_pushes() || reason == Reason::Manual
+    }
 }
 
 /// Wall-clock seconds of one step, by what they went into.
@@ -55,6 +71,7 @@ impl StepSeconds {
 
 /// One step as `episode.json` keeps it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "RawStep")]
 pub struct StepRecord {
     /// 1 for the first action; the belief after it is `beliefs/001.npz`.
     pub index: usize,
@@ -62,22 +79,71 @@ pub struct StepRecord {
     pub action: Action,
     /// What was weighed.
     pub decision: Decision,
-    /// Scores of the belief after the step.
-    pub scores: Scores,
-    /// Verdict per object of the scene, and hallucinated ones.
-    pub objects: Vec<ObjectVerdict>,
-    /// Names of objects that this step dropped, `class#id`.
-    pub dropped: Vec<String>,
-    /// Sum of object displacements of this step, metres.
-    pub displacement_m: f64,
+    /// Entropy of the map after the step, nats.
+    pub entropy_nats: f64,
+    /// Scores, verdicts, drops and displacements, where the truth is known; its members stand beside the others.
+    #[serde(flatten)]
+    pub judgement: Option<Judgement>,
     /// How long the robot moved in this step, seconds of its own time; 0 where no arm could be there.
-    #[serde(default)]
     pub motion_s: f64,
     /// What the arm met, after a manipulation of whatever skill.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub push: Option<PushReport>,
     /// Where the time went.
     pub seconds: StepSeconds,
+}
+
+impl StepRecord {
+    /// Scores of the belief after the step, where the truth is known.
+    pub fn scores(&self) -> Option<&Scores> {
+        self.judgement.as_ref().map(|judgement| &judgement.scores)
+    }
+
+    /// The verdicts on the objects; none without a truth.
+    pub fn objects(&self) -> &[ObjectVerdict] {
+        self.judgement.as_ref().map_or(&[], |judgement| &judgement.objects)
+    }
+
+    /// Names of the objects that this step is known to have dropped.
+    pub fn dropped(&self) -> &[String] {
+        self.judgement.as_ref().map_or(&[], |judgement| &judgement.dropped)
+    }
+
+    /// Sum of object displacements, metres, where it is known.
+    pub fn displacement_m(&self) -> Option<f64> {
+        self.judgement.as_ref().map(|judgement| judgement.displacement_m)
+    }
+}
+
+/// A step as it is read.
+#[derive(Deserialize)]
+struct RawStep {
+    index: usize,
+    action: Action,
+    decision: Decision,
+    entropy_nats: Option<f64>,
+    scores: Option<Scores>,
+    objects: Option<Vec<ObjectVerdict>>,
+    dropped: Option<Vec<String>>,
+    displacement_m: Option<f64>,
+    #[serde(default)]
+    motion_s: f64,
+    push: Option<PushReport>,
+    seconds: StepSeconds,
+}
+
+impl TryFrom<RawStep> for StepRecord {
+    type Error = String;
+
+    fn try_from(raw: RawStep) -> Result<Self, String> {
+        let RawStep {
+            index, action, decision, scores, objects, dropped, displacement_m, motion_s, push, seconds, ..
+        } = raw;
+        let judgement = RawJudgement { scores, objects, dropped, displacement_m }.checked()?;
+        let scored = judgement.as_ref().map(|judgement| judgement.scores.entropy_nats);
+        let entropy_nats = raw.entropy_nats.or(scored).ok_or("missing field `entropy_nats`")?;
+        Ok(Self { index, action, decision, entropy_nats, judgement, motion_s, push, seconds })
+    }
 }
 
 /// What became of a manipulation by the arm.
@@ -131,8 +197,8 @@ pub struct EpisodeRecord {
     /// Policy, belief, seed, budget, views and planner settings.
     #[serde(flatten)]
     pub config: EpisodeConfig,
-    /// Scores of the prior.
-    pub prior: Scores,
+    /// Scores of the prior, or its entropy alone.
+    pub prior: Prior,
     /// The steps so far.
     pub steps: Vec<StepRecord>,
 }
@@ -156,16 +222,35 @@ impl EpisodeRecord {
         }
     }
 
-    /// The numbers of actions after which there is a truth: 0 and every push.
+    /// Whether the truth is known, so that beliefs are scored.
+    pub fn has_truth(&self) -> bool {
+        self.prior.scores.is_some()
+    }
+
+    /// Scores after a number of actions, 0 for the prior, where the truth is known.
+    pub fn scores_after(&self, actions: usize) -> Option<&Scores> {
+        match actions.checked_sub(1) {
+            Some(at) => self.steps.get(at)?.scores(),
+            None => self.prior.scores.as_ref(),
+        }
+    }
+
+    /// Entropy of the map after a number of actions, 0 for the prior, nats.
+    pub fn entropy_after(&self, actions: usize) -> f64 {
+        let step = actions.checked_sub(1).and_then(|at| self.steps.get(at));
+        step.map_or(self.prior.entropy_nats, |step| step.entropy_nats)
+    }
+
+    /// The numbers of actions after which a truth is filed: 0 and every push; none where the truth is not known.
     pub fn truth_indices(&self) -> impl Iterator<Item = usize> + '_ {
         let pushes =
             self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index);
-        std::iter::once(0).chain(pushes)
+        std::iter::once(0).chain(pushes).filter(|_| self.has_truth())
     }
 
-    /// The truth that holds after `actions` actions: the index of the last push until then, or 0.
-    pub fn truth_index(&self, actions: usize) -> usize {
-        self.truth_indices().take_while(|index| *index <= actions).last().unwrap_or(0)
+    /// Whether there is another truth after `actions` actions than before the last of them.
+    pub fn has_new_truth(&self, actions: usize) -> bool {
+        self.truth_indices().any(|index| index == actions)
     }
 }
 
@@ -174,12 +259,12 @@ impl EpisodeRecord {
 pub struct StepOutcome {
     /// The step as it is filed.
     pub record: StepRecord,
-    /// The image, after a look.
-    pub image: Option<Image>,
-    /// The image projected into the grid, after a look.
+    /// The frame as the belief update saw it, noise included, after a look.
+    pub frame: Option<Frame>,
+    /// The frame projected into the grid, after a look.
     pub observation: Option<MapObservation>,
-    /// What the belief update was told, after a manipulation.
-    pub intervention: Option<Intervention>,
+    /// The manipulation as far as it came, with what it swept, after one.
+    pub swept: Option<SweptManipulation>,
     /// The belief that was predicted, after a manipulation that was predicted.
     pub prediction: Option<Prediction>,
     /// What the manipulation did.

@@ -1,10 +1,11 @@
 //! Running an episode again from its log and verifying every step.
 
 use super::directory::EpisodeDir;
+use super::judgement::NO_TRUTH;
 use super::machine::Episode;
 use super::npz::StoredTruth;
 use super::record::{EpisodeRecord, StepRecord};
-use crate::belief::{BeliefUpdate, CLASSICAL};
+use crate::belief::{Belief, BeliefUpdate, CLASSICAL};
 use crate::plan::Reason;
 use crate::scene::Catalog;
 use crate::{Error, Result};
@@ -90,9 +91,12 @@ pub fn replay(
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<ReplayReport> {
     let logged = directory.record()?;
-    let tolerance = if logged.config.belief == CLASSICAL { 0.0 } else { TOLERANCE };
+    if !logged.has_truth() {
+        let message = format!("cannot be simulated again: {NO_TRUTH}; its beliefs can be inferred again (--infer)");
+        return Err(Error::input(directory.path(), "", message));
+    }
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
-    let mut comparison = Comparison::new(tolerance);
+    let mut comparison = Comparison::new(tolerance(&logged));
     comparison.prior(&logged, episode.record());
     comparison.arrays(directory, &logged, 0, &episode)?;
     progress(0, logged.steps.len());
@@ -106,13 +110,12 @@ pub fn replay(
         comparison.arrays(directory, &logged, step.index, &episode)?;
         progress(step.index, logged.steps.len());
     }
-    Ok(ReplayReport {
-        steps: logged.steps.len(),
-        budget: logged.config.budget,
-        version: logged.version.clone(),
-        agreement: comparison.agreement(),
-        differences: comparison.differences,
-    })
+    Ok(comparison.report(&logged))
+}
+
+/// How far numbers of an episode may be off.
+pub(super) fn tolerance(logged: &EpisodeRecord) -> f64 {
+    if logged.config.belief == CLASSICAL { 0.0 } else { TOLERANCE }
 }
 
 /// Compares what is filed with what is, and remembers the first difference of every step.
@@ -132,6 +135,16 @@ impl Comparison {
         self.differences.into_iter().next()
     }
 
+    pub(super) fn report(self, logged: &EpisodeRecord) -> ReplayReport {
+        ReplayReport {
+            steps: logged.steps.len(),
+            budget: logged.config.budget,
+            version: logged.version.clone(),
+            agreement: self.agreement(),
+            differences: self.differences,
+        }
+    }
+
     fn agreement(&self) -> Agreement {
         if !self.differences.is_empty() {
             Agreement::Differs
@@ -142,7 +155,7 @@ impl Comparison {
         }
     }
 
-    fn at(&mut self, step: usize) {
+    pub(super) fn at(&mut self, step: usize) {
         self.step = step;
     }
 
@@ -166,19 +179,24 @@ impl Comparison {
         actions: usize,
         episode: &Episode,
     ) -> Result<()> {
+        self.belief(directory, actions, episode.belief())?;
+        if let Some(truth) = episode.truth().filter(|_| logged.has_new_truth(actions)) {
+            let filed = directory.read_truth(actions)?;
+            let now = StoredTruth::from(truth);
+            self.classes(&format!("truth/{actions:03}.npz: occupancy"), &filed.occupancy, &now.occupancy);
+            self.classes(&format!("truth/{actions:03}.npz: labels"), &filed.labels, &now.labels);
+        }
+        Ok(())
+    }
+
+    /// Compares a belief with the one that is filed after `actions` actions.
+    pub(super) fn belief(&mut self, directory: &EpisodeDir, actions: usize, belief: &Belief) -> Result<()> {
         let (filed, precision) = directory.read_belief_as_kept(actions)?;
-        let belief = episode.belief();
         let place = |array: &str| format!("beliefs/{actions:03}.npz: {array}");
         let occupancy = precision.round_trip(belief.occupancy.as_flattened());
         self.evidence(&place("occupancy"), filed.occupancy.as_flattened(), &occupancy);
         let semantics = precision.round_trip(belief.semantics.as_flattened());
         self.evidence(&place("semantics"), filed.semantics.as_flattened(), &semantics);
-        if logged.truth_index(actions) == actions {
-            let filed = directory.read_truth(actions)?;
-            let now = StoredTruth::from(episode.truth());
-            self.classes(&format!("truth/{actions:03}.npz: occupancy"), &filed.occupancy, &now.occupancy);
-            self.classes(&format!("truth/{actions:03}.npz: labels"), &filed.labels, &now.labels);
-        }
         Ok(())
     }
 
@@ -201,7 +219,7 @@ impl Comparison {
         }
     }
 
-    fn documents(&mut self, place: &str, logged: &impl Serialize, now: &impl Serialize) {
+    pub(super) fn documents(&mut self, place: &str, logged: &impl Serialize, now: &impl Serialize) {
         // Through text, so that float32 shows as it does in the file.
         let value = |text: serde_json::Result<String>| text.and_then(|text| serde_json::from_str::<Value>(&text));
         match (value(serde_json::to_string(logged)), value(serde_json::to_string(now))) {

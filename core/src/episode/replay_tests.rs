@@ -105,10 +105,10 @@ fn an_episode_resumes_and_replays_to_the_bit() {
         fs::write(path.join("episode.json"), record.to_json()).expect("written");
     };
     edit(&|record| {
-        record.prior.entropy_nats += 1.0;
+        record.prior.scores.as_mut().expect("a truth").entropy_nats += 1.0;
         record.steps[1].decision.gains[7] += 0.25;
-        record.steps[3].scores.semantic_miou += 1e-12;
-        record.steps[5].objects[0].class = "gum_tin".to_owned();
+        record.steps[3].judgement.as_mut().expect("a truth").scores.semantic_miou += 1e-12;
+        record.steps[5].judgement.as_mut().expect("a truth").objects[0].class = "gum_tin".to_owned();
     });
     change_arrays(&path, &first);
     let report = replayed(&path).expect("replays");
@@ -130,7 +130,7 @@ fn an_episode_resumes_and_replays_to_the_bit() {
 
     // A resume notices as well.
     copy(&whole, &path);
-    edit(&|record| record.steps[2].displacement_m = 0.5);
+    edit(&|record| record.steps[2].judgement.as_mut().expect("a truth").displacement_m = 0.5);
     let error =
         resume(&path, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |_, _| Ok(())).err().expect("differs");
     assert_eq!(error.exit_code(), 1);
@@ -140,7 +140,7 @@ fn an_episode_resumes_and_replays_to_the_bit() {
     );
     // Seconds are nobody's business; a byte that flipped in a file is bad input.
     edit(&|record| {
-        record.steps[2].displacement_m = 0.0;
+        record.steps[2].judgement.as_mut().expect("a truth").displacement_m = 0.0;
         record.steps[2].seconds.decide = 99.0;
     });
     drop(resume(&path, Arc::new(Catalog::standard()), Arc::new(Classical), &mut |_, _| Ok(())).expect("resumes"));
@@ -172,18 +172,19 @@ fn who_only_looks_is_shown_what_is_filed_and_told_where_it_parts_from_what_is() 
     // As if another version had written steps 3 and 5.
     let directory = EpisodeDir::open(&path).expect("opens");
     let mut record = directory.record().expect("a record");
-    record.steps[2].scores.semantic_miou = 0.125;
+    record.steps[2].judgement.as_mut().expect("a truth").scores.semantic_miou = 0.125;
     fs::write(path.join("episode.json"), record.to_json()).expect("written");
     let belief = change_arrays(&path, &first);
     let mut shown = Vec::new();
     let (whole, difference) = reviewed(&mut |episode, step| {
-        let score = step.map_or(episode.record().prior, |step| step.scores).semantic_miou;
-        shown.push((episode.belief().semantics[17][2], score, episode.truth().occupancy[1234]));
+        let scores = step.map_or(episode.record().prior.scores.as_ref(), |step| step.scores());
+        let score = scores.expect("a truth").semantic_miou;
+        shown.push((episode.belief().semantics[17][2], score, episode.truth().expect("a truth").occupancy[1234]));
     });
     let words = difference.expect("told").to_string();
     assert!(words.starts_with("step 3: scores.semantic_miou: 0.125 in the log, "), "{words}");
     assert_eq!((shown[3].0, shown[3].1), (belief.semantics[17][2], 0.125));
-    let occupied = first.truth().occupancy[1234];
+    let occupied = first.truth().expect("a truth").occupancy[1234];
     assert_eq!([shown[0].2, shown[4].2, shown[5].2], [occupied, occupied, occupied ^ 1]);
     assert_eq!((shown.len(), whole.record()), (BUDGET + 1, &record));
     assert_eq!(names_of(&path), ["beliefs", "episode.json", "truth"]);
@@ -208,7 +209,7 @@ fn change_arrays(path: &Path, first: &Episode) -> Belief {
     let mut belief = directory.read_belief(3).expect("a belief");
     belief.semantics[17][2] += 0.5;
     fs::write(directory.belief_path(3), npz::belief_archive(&belief, Precision::Half)).expect("written");
-    let mut truth = first.truth().clone();
+    let mut truth = first.truth().expect("a truth").clone();
     truth.occupancy[1234] ^= 1;
     fs::write(directory.truth_path(5), npz::truth_archive(&truth)).expect("written");
     belief

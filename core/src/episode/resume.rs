@@ -1,12 +1,15 @@
 //! Opening an episode again: to continue a run that was stopped, or to look at it.
 
 use super::directory::EpisodeDir;
+use super::filed;
+use super::judgement::NO_TRUTH;
 use super::machine::Episode;
 use super::record::{EpisodeRecord, StepOutcome};
 use super::replay::{Comparison, Difference};
 use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction};
 use crate::camera::MapObservation;
 use crate::scene::Catalog;
+use crate::score::Scores;
 use crate::{Error, Result};
 use std::path::Path;
 use std::sync::Arc;
@@ -29,11 +32,57 @@ pub fn resume(
     observer: Observer<'_>,
 ) -> Result<(EpisodeDir, Episode)> {
     let directory = EpisodeDir::open_to_write(path.as_ref())?;
-    if let Some(words) = directory.record()?.other_weights(&*update) {
-        return Err(Error::input(directory.path(), "", format!("cannot be resumed: {words}")));
-    }
+    refuse_other_weights(&directory, &directory.record()?, &*update)?;
     let (episode, _) = retrace(&directory, catalog, update, Departure::Refused, usize::MAX, observer)?;
     Ok((directory, episode))
+}
+
+/// Opens the episode in `path` to continue it from its checkpoint, without repeating anything: a run that is killed again and
+/// again still gets on. What is filed last (belief, scores, truth) is compared with the checkpoint. The pushes so far are
+/// simulated again when the next one is carried out, and have to lead to the same poses. `None` where there is no checkpoint of
+/// the last step: [`resume`] then goes on.
+///
+/// # Errors
+/// Those of [`resume`].
+pub fn resume_from_checkpoint(
+    path: impl AsRef<Path>,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+) -> Result<Option<(EpisodeDir, Episode)>> {
+    let directory = EpisodeDir::open_to_write(path.as_ref())?;
+    let logged = directory.record()?;
+    refuse_other_weights(&directory, &logged, &*update)?;
+    refuse_without_truth(&directory, &logged)?;
+    let Some(checkpoint) = directory.read_checkpoint(&logged)? else { return Ok(None) };
+    let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
+    let done = logged.steps.len();
+    if episode.go_to(checkpoint, logged.clone()).is_err() {
+        return Ok(None);
+    }
+    let mut comparison = Comparison::new(0.0);
+    comparison.at(done);
+    comparison.arrays(&directory, &logged, done, &episode)?;
+    if let (Some(scores), Some(truth)) = (logged.scores_after(done), episode.truth()) {
+        comparison.documents("scores", scores, &Scores::of(episode.belief(), truth));
+    }
+    refuse(&directory, comparison.into_first_difference())?;
+    Ok(Some((directory, episode)))
+}
+
+fn refuse_other_weights(directory: &EpisodeDir, logged: &EpisodeRecord, update: &dyn BeliefUpdate) -> Result<()> {
+    let refused = |words| Err(Error::input(directory.path(), "", format!("cannot be resumed: {words}")));
+    logged.other_weights(update).map_or(Ok(()), refused)
+}
+
+/// What was not simulated cannot be repeated.
+fn refuse_without_truth(directory: &EpisodeDir, logged: &EpisodeRecord) -> Result<()> {
+    let message = || format!("cannot be resumed: {NO_TRUTH}, so its shelf cannot be simulated");
+    if logged.has_truth() { Ok(()) } else { Err(Error::input(directory.path(), "", message())) }
+}
+
+fn refuse(directory: &EpisodeDir, difference: Option<Difference>) -> Result<()> {
+    let place = directory.path().display();
+    difference.map_or(Ok(()), |found| Err(Error::Check(format!("{place}: cannot be resumed: {found}"))))
 }
 
 /// Opens the episode in `path` to look at it: nothing is locked or written. Where the repeated actions do not lead where
@@ -52,6 +101,9 @@ pub fn review(
     observer: Observer<'_>,
 ) -> Result<(Episode, Option<Difference>)> {
     let directory = EpisodeDir::open(path.as_ref())?;
+    if !directory.record()?.has_truth() {
+        return Ok((filed::look_through(&directory, catalog, update, observer)?, None));
+    }
     match update {
         Some(update) => retrace(&directory, catalog, update, Departure::Overruled, usize::MAX, observer),
         None => {
@@ -76,7 +128,7 @@ pub(crate) fn revisit(
 }
 
 /// Placeholder for an update that the log names and this program lacks: leaves every belief as it is.
-struct Absent(String);
+pub(super) struct Absent(pub(super) String);
 
 impl BeliefUpdate for Absent {
     fn name(&self) -> &str {
@@ -113,6 +165,7 @@ fn retrace(
     observer: Observer<'_>,
 ) -> Result<(Episode, Option<Difference>)> {
     let logged = directory.record()?;
+    refuse_without_truth(directory, &logged)?;
     let mut episode = Episode::new(logged.scene.clone(), catalog, logged.config.clone(), update)?;
     let mut first = None;
     for done in 0..=logged.steps.len().min(actions) {
@@ -122,12 +175,12 @@ fn retrace(
             Departure::Expected => None,
             Departure::Refused | Departure::Overruled => difference(directory, &logged, done, &episode)?,
         };
-        if let (Departure::Refused, Some(difference)) = (departure, &difference) {
-            let place = directory.path().display();
-            return Err(Error::Check(format!("{place}: cannot be resumed: {difference}")));
+        if departure == Departure::Refused {
+            refuse(directory, difference.clone())?;
         }
         if departure == Departure::Expected || difference.is_some() {
-            episode.adopt_state(&logged, directory.read_belief(done)?, directory.read_truth(done)?);
+            let truth = logged.has_truth().then(|| directory.read_truth(done)).transpose()?;
+            episode.adopt_state(&logged, directory.read_belief(done)?, truth);
             if let (Some(outcome), Some(step)) = (&mut outcome, step) {
                 outcome.record = step.clone();
             }

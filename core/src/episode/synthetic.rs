@@ -1,12 +1,13 @@
 //! Episodes for tests: a small made-up one for files, without camera, world or planner in it, and a real one on a
 //! coarse grid.
 
+use super::judgement::Judgement;
 use super::machine::Episode;
 use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, StepRecord, StepSeconds};
 use crate::belief::{Belief, Classical};
 use crate::camera::ViewId;
 use crate::made_by::{Build, MadeBy};
-use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
+use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason, Rule};
 use crate::rng;
 use crate::scene::{BACKGROUND, CLASS_COUNT, Catalog, Object, Scene, Shelf};
 use crate::score::{ObjectVerdict, Scores, Verdict};
@@ -67,16 +68,20 @@ pub fn record(steps: usize) -> EpisodeRecord {
                 candidates,
                 best_push: Some(0),
                 motion: None,
+                rule: Some(Rule::default()),
             },
-            scores: scores(index),
-            objects: vec![ObjectVerdict {
-                object: Some(0),
-                class: "tomato_can".to_owned(),
-                verdict: Verdict::NotFound,
-                position: [0.0, 0.04],
-            }],
-            dropped: if index == 2 { vec!["tomato_can#0".to_owned()] } else { Vec::new() },
-            displacement_m: 0.01 * index as f64,
+            entropy_nats: scores(index).entropy_nats,
+            judgement: Some(Judgement {
+                scores: scores(index),
+                objects: vec![ObjectVerdict {
+                    object: Some(0),
+                    class: "tomato_can".to_owned(),
+                    verdict: Verdict::NotFound,
+                    position: [0.0, 0.04],
+                }],
+                dropped: if index == 2 { vec!["tomato_can#0".to_owned()] } else { Vec::new() },
+                displacement_m: 0.01 * index as f64,
+            }),
             motion_s: 1.5 * index as f64,
             push: None,
             seconds: StepSeconds { decide: 0.1, act: 0.2, update: 0.3, record: 0.4 },
@@ -97,7 +102,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
             planner: PlannerSettings::default(),
             noise: None,
         },
-        prior: scores(0),
+        prior: scores(0).into(),
         steps: (1..=steps).map(step).collect(),
     }
 }

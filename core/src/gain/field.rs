@@ -1,6 +1,7 @@
 //! A belief's occupancy prepared for walking rays.
 
 use super::code::{MATTER, OPAQUE, Quantiser};
+use super::layout::{Layout, VoxelBox};
 use super::{RayDensity, arrivals, skip};
 use crate::belief::{Belief, Prediction, beta_mean};
 use crate::camera::{ViewArray, ViewId};
@@ -8,9 +9,6 @@ use crate::grid::{Grid, VoxelSet, Window};
 use crate::world::TruthMap;
 use rayon::prelude::*;
 use std::sync::Arc;
-
-/// The most voxels along one axis that fixed-point rays can count.
-const MOST_VOXELS: usize = 2_000;
 
 /// A belief's occupancy prepared for walking rays: 8-bit probabilities in a padded grid, transparent voxels with the
 /// room ahead of them.
@@ -103,11 +101,6 @@ impl GainField {
         Self { layout: self.layout, codes: self.codes.clone(), seen: Some(Arc::new(arrival)) }
     }
 
-    /// Whether it distinguishes seen voxels, as made by [`GainField::with_seen`].
-    pub fn knows_seen(&self) -> bool {
-        self.seen.is_some()
-    }
-
     /// What of a ray's transmittance at a voxel tells something that no earlier view saw.
     #[inline(always)]
     pub(super) fn unseen_share(&self, index: usize, transmittance: f32) -> f32 {
@@ -183,68 +176,5 @@ impl GainField {
             skip::mark(&mut field.codes, &self.layout, touched, skip::LOCAL_LEVELS);
         }
         (field, changed)
-    }
-}
-
-/// A box of voxels, both corners included.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct VoxelBox {
-    pub min: [usize; 3],
-    pub max: [usize; 3],
-}
-
-impl VoxelBox {
-    /// Grows a box, or begins it, so that it holds `voxel`.
-    fn add(grown: &mut Option<Self>, voxel: [usize; 3]) {
-        let grown = grown.get_or_insert(Self { min: voxel, max: voxel });
-        for (axis, at) in voxel.into_iter().enumerate() {
-            grown.min[axis] = grown.min[axis].min(at);
-            grown.max[axis] = grown.max[axis].max(at);
-        }
-    }
-}
-
-/// The padded grid: an opaque voxel around the shelf, shared by neighbouring lines and planes, so that a ray that
-/// leaves the shelf anywhere but through its open front meets one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Layout {
-    pub grid: Grid,
-    /// Distance in the padded array between neighbours along x, y and z.
-    pub stride: [usize; 3],
-}
-
-impl Layout {
-    fn of(grid: &Grid) -> Self {
-        assert!(grid.dims.iter().all(|&n| n <= MOST_VOXELS), "at most {MOST_VOXELS} voxels along an axis");
-        let line = grid.dims[2] + 1;
-        Self { grid: *grid, stride: [(grid.dims[1] + 1) * line, line, 1] }
-    }
-
-    /// Number of padded voxels: a plane and a line before the first voxel, a plane after the last.
-    pub fn len(&self) -> usize {
-        (self.grid.dims[0] + 2) * self.stride[0] + self.stride[1]
-    }
-
-    /// Position of a voxel in the padded grid.
-    pub fn at(&self, voxel: [usize; 3]) -> usize {
-        (voxel[0] + 1) * self.stride[0] + (voxel[1] + 1) * self.stride[1] + voxel[2]
-    }
-
-    /// Position in the padded grid of a floor cell's lowest voxel.
-    pub fn column(&self, cell: usize) -> usize {
-        self.at([cell / self.grid.dims[1], cell % self.grid.dims[1], 0])
-    }
-
-    /// Position in the padded grid of the voxel at `index` in arrays over voxels.
-    pub fn padded(&self, index: usize) -> usize {
-        let voxel = self.grid.voxel(index);
-        self.at([voxel.x, voxel.y, voxel.z].map(usize::from))
-    }
-
-    /// Position in arrays over voxels of a voxel inside the shelf.
-    pub fn unpadded(&self, padded: usize) -> usize {
-        let at = padded - self.at([0, 0, 0]);
-        let (x, y, z) = (at / self.stride[0], at % self.stride[0] / self.stride[1], at % self.stride[1]);
-        (x * self.grid.dims[1] + y) * self.grid.dims[2] + z
     }
 }

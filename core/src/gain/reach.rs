@@ -6,24 +6,52 @@
 use super::RayDensity;
 use super::field::GainField;
 use super::ray::{Camera, Ray, Tally};
-use super::skip::is_transparent;
-use crate::camera::{View, ViewArray};
+use crate::Point;
+use crate::camera::{Intrinsics, View, ViewArray};
 use crate::grid::{Grid, VoxelSet};
+use crate::solid::Bounds;
 use crate::world::TruthMap;
 use rayon::prelude::*;
+use std::ops::Range;
+
+/// Nearer to the camera's plane than this, a corner of a box has no place in the image, metres.
+const BEFORE_CAMERA_M: f32 = 1e-3;
+
+/// Every so many-th view counts for what is shown of objects: neighbours see the same things.
+const SHOWN_EVERY: usize = 4;
 
 /// What all views of an array together reach of a true map.
 pub struct TrueReach {
     /// Without skip levels, so that a ray visits every voxel on its way.
     field: GainField,
-    /// Each ray where it enters, and the position in the padded grid of what stops it.
-    rays: Vec<(Ray, u32)>,
+    array: ViewArray,
+    density: RayDensity,
+    /// Of each view's rays.
+    views: Vec<ViewRays>,
     /// Per voxel of the padded grid, whether a ray reaches it.
     reached: Vec<bool>,
+    /// Per voxel of the padded grid, how many rays of every [`SHOWN_EVERY`]-th view it stops.
+    stopped: Vec<u32>,
 }
 
-/// What some of the views reach: the rays with their stops, and the voxels of the padded grid.
-type Walked = (Vec<(Ray, u32)>, Vec<bool>);
+/// The rays of a view that enter the shelf.
+#[derive(Default)]
+struct ViewRays {
+    /// Each where it enters.
+    rays: Vec<Ray>,
+    /// Position in the padded grid of what stops it.
+    stops: Vec<u32>,
+    /// Its column and row among the view's rays.
+    places: Vec<[u16; 2]>,
+}
+
+/// What all views reach once some bodies stand elsewhere.
+pub struct ReachAfter {
+    /// The voxels that a view reaches now and none reached before.
+    pub opened: VoxelSet,
+    field: GainField,
+    stopped: Vec<u32>,
+}
 
 impl TrueReach {
     /// Walks all rays of all views. The result does not depend on the number of threads.
@@ -33,22 +61,29 @@ impl TrueReach {
     pub fn new(grid: &Grid, truth: &TruthMap, array: &ViewArray, density: RayDensity) -> Self {
         let field = GainField::of_truth(grid, truth);
         let begin = || (Vec::new(), vec![false; field.codes.len()]);
-        let walk = |(mut rays, mut reached): Walked, view: &View| {
-            Camera::of(&field, array, view.id).for_each_ray(&field, density, |_, ray| {
+        let walk = |(mut views, mut reached): (Vec<ViewRays>, Vec<bool>), view: &View| {
+            let camera = Camera::of(&field, array, view.id);
+            let down = camera.rays(density)[1];
+            let mut seen = ViewRays::default();
+            camera.for_each_ray(&field, density, |number, ray| {
                 let mut tally = Reached { reached: &mut reached, stop: 0 };
                 ray.walk(&field, &mut tally);
-                let stop = tally.stop;
-                rays.push((ray, stop as u32));
+                seen.stops.push(tally.stop as u32);
+                seen.places.push([(number / down) as u16, (number % down) as u16]);
+                seen.rays.push(ray);
             });
-            (rays, reached)
+            views.push(seen);
+            (views, reached)
         };
-        let join = |(mut rays, mut reached): Walked, other: Walked| {
-            rays.extend(other.0);
+        let join = |(mut views, mut reached): (Vec<ViewRays>, Vec<bool>), other: (Vec<ViewRays>, Vec<bool>)| {
+            views.extend(other.0);
             reached.iter_mut().zip(other.1).for_each(|(reached, other)| *reached |= other);
-            (rays, reached)
+            (views, reached)
         };
-        let (rays, reached) = array.views.par_iter().fold(begin, walk).reduce(begin, join);
-        Self { field, rays, reached }
+        let (views, reached) = array.views.par_iter().fold(begin, walk).reduce(begin, join);
+        let mut stopped = vec![0; field.codes.len()];
+        views.iter().step_by(SHOWN_EVERY).flat_map(|view| &view.stops).for_each(|stop| stopped[*stop as usize] += 1);
+        Self { field, array: array.clone(), density, views, reached, stopped }
     }
 
     /// The voxels that a view reaches.
@@ -56,18 +91,106 @@ impl TrueReach {
         inside(&self.field, |index| self.reached[index])
     }
 
+    /// How many voxels of each object a view reaches, of every fourth view of the array; `owners` says per voxel whose it is,
+    /// as [`TruthMap::owners`].
+    pub fn shown(&self, owners: &[u16], objects: usize) -> Vec<u32> {
+        shown(&self.field, &self.stopped, owners, objects)
+    }
+
     /// The voxels that a view reaches once the bodies stand as in `after`, a truth of the same grid, and that none reached
     /// before. Only rays whose stop has become free are walked: no other reaches anything new.
     pub fn opened(&self, after: &TruthMap) -> VoxelSet {
+        self.after(after, &[]).opened
+    }
+
+    /// What views reach once the bodies stand as in `after`, a truth of the same grid; everything that is filled there and
+    /// was not before is inside of one of the boxes `filled`. Only rays are walked whose stop has become free or, of views that
+    /// count for what is shown, that may meet a box: all others end where they ended.
+    pub fn after(&self, after: &TruthMap, filled: &[Bounds]) -> ReachAfter {
         let field = GainField::of_truth(self.field.grid(), after);
-        let mut reached = self.reached.clone();
-        for (ray, stop) in &self.rays {
-            if is_transparent(field.codes[*stop as usize]) {
-                ray.walk(&field, &mut Reached { reached: &mut reached, stop: 0 });
+        let mut freed = vec![0_u64; field.codes.len().div_ceil(64)];
+        for (at, (before, now)) in self.field.codes.iter().zip(&field.codes).enumerate() {
+            if before > now {
+                freed[at / 64] |= 1 << (at % 64);
             }
         }
-        inside(&field, |index| reached[index] && !self.reached[index])
+        let mut reached = self.reached.clone();
+        let mut stopped = self.stopped.clone();
+        for (number, (view, seen)) in self.array.views.iter().zip(&self.views).enumerate() {
+            let counts = number % SHOWN_EVERY == 0;
+            let boxes = filled.iter().filter(|_| counts);
+            let across: Vec<[Range<u16>; 2]> = boxes.map(|bounds| self.rays_through(view, bounds)).collect();
+            let may_meet = |[column, row]: [u16; 2]| {
+                across.iter().any(|[columns, rows]| columns.contains(&column) && rows.contains(&row))
+            };
+            for (at, (stop, place)) in seen.stops.iter().zip(&seen.places).enumerate() {
+                let stop = *stop as usize;
+                if freed[stop / 64] >> (stop % 64) & 1 == 1 || may_meet(*place) {
+                    let mut tally = Reached { reached: &mut reached, stop: 0 };
+                    seen.rays[at].walk(&field, &mut tally);
+                    if counts {
+                        stopped[stop] -= 1;
+                        stopped[tally.stop] += 1;
+                    }
+                }
+            }
+        }
+        let opened = inside(&field, |index| reached[index] && !self.reached[index]);
+        ReachAfter { opened, field, stopped }
     }
+
+    /// Columns and rows of a view's rays that may meet a voxel that touches a box.
+    fn rays_through(&self, view: &View, bounds: &Bounds) -> [Range<u16>; 2] {
+        let Intrinsics { width, height, focal_px, .. } = self.array.intrinsics;
+        let margin_m = 1.5 * self.field.grid().voxel_m;
+        let camera_from_world = view.world_from_camera.inverse();
+        let center = self.array.intrinsics.principal_px();
+        let count = self.density.rays([width, height]).map(|count| count as u16);
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for corner in 0..8 {
+            let pick = |axis: usize| match corner >> axis & 1 {
+                0 => bounds.min[axis] - margin_m,
+                _ => bounds.max[axis] + margin_m,
+            };
+            let seen = camera_from_world * Point::new(pick(0), pick(1), pick(2));
+            if seen.z < BEFORE_CAMERA_M {
+                return [0..count[0], 0..count[1]];
+            }
+            for axis in 0..2 {
+                let pixel = focal_px * seen[axis] / seen.z + center[axis];
+                (low[axis], high[axis]) = (low[axis].min(pixel), high[axis].max(pixel));
+            }
+        }
+        // Ray `n` is at pixel `(n + 0.5) stride`; one ray more to either side.
+        let stride = self.density.stride_px as f32;
+        std::array::from_fn(|axis| {
+            let first = (low[axis] / stride - 1.5).clamp(0.0, f32::from(count[axis]));
+            let end = (high[axis] / stride + 1.5).clamp(0.0, f32::from(count[axis]));
+            first.floor() as u16..end.ceil() as u16
+        })
+    }
+}
+
+impl ReachAfter {
+    /// How many voxels of each object a view reaches, as [`TrueReach::shown`].
+    pub fn shown(&self, owners: &[u16], objects: usize) -> Vec<u32> {
+        shown(&self.field, &self.stopped, owners, objects)
+    }
+}
+
+/// Counts the voxels of each object that stop a ray.
+fn shown(field: &GainField, stopped: &[u32], owners: &[u16], objects: usize) -> Vec<u32> {
+    let grid = field.grid();
+    let mut counts = vec![0; objects];
+    for cell in 0..grid.cell_count() {
+        let padded = field.layout.column(cell);
+        for (level, owner) in owners[grid.column(cell)].iter().enumerate() {
+            if let Some(count) = counts.get_mut(usize::from(*owner)) {
+                *count += u32::from(stopped[padded + level] > 0);
+            }
+        }
+    }
+    counts
 }
 
 /// The voxels of the shelf whose position in the padded grid is one of those.
@@ -157,6 +280,42 @@ mod tests {
             total += expected.len();
         }
         assert!(total > 100, "the test opens something: {total}");
+    }
+
+    #[test]
+    fn what_shows_of_objects_afterwards_is_what_a_look_from_everywhere_says() {
+        let grid = small_grid();
+        let array = ViewArray { views: standard().views.into_iter().take(40).collect(), ..standard() };
+        let density = RayDensity { stride_px: 24 };
+        let [width, depth, height] = grid.dims;
+        // Three upright blocks of voxels, of which the second moves.
+        let block = |x: usize, y: usize| {
+            let columns = (x..x + 4).flat_map(move |x| (y..y + 3).map(move |y| x * depth + y));
+            columns.flat_map(move |cell| cell * height..cell * height + height / 2)
+        };
+        let put = |places: [[usize; 2]; 3]| {
+            let mut owners = vec![u16::MAX; grid.voxel_count()];
+            for (object, [x, y]) in places.into_iter().enumerate() {
+                block(x, y).for_each(|voxel| owners[voxel] = object as u16);
+            }
+            let filled: Vec<usize> = (0..owners.len()).filter(|voxel| owners[*voxel] != u16::MAX).collect();
+            (truth(&grid, &filled), owners)
+        };
+        let [far, middle] = [depth - 4, width / 2];
+        let (before, owners) = put([[middle, far], [middle, 1], [2, far]]);
+        let reach = TrueReach::new(&grid, &before, &array, density);
+        for [x, y] in [[2, 2], [middle + 3, 1], [middle, 5]] {
+            let (after, now) = put([[middle, far], [x, y], [2, far]]);
+            let corner = |x: usize, y: usize, z: usize| {
+                Point::from(std::array::from_fn(|axis| grid.origin[axis] + [x, y, z][axis] as f32 * grid.voxel_m))
+            };
+            let filled = Bounds { min: corner(x, y, 0), max: corner(x + 4, y + 3, height / 2) };
+            let quick = reach.after(&after, &[filled]);
+            let fresh = TrueReach::new(&grid, &after, &array, density);
+            assert_eq!(quick.shown(&now, 3), fresh.shown(&now, 3));
+            assert_ne!(quick.shown(&now, 3), reach.shown(&owners, 3));
+            assert!(quick.stopped == fresh.stopped && quick.opened == reach.opened(&after));
+        }
     }
 
     #[test]

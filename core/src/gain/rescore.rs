@@ -1,6 +1,7 @@
 //! Gains under many predictions that differ from one field in a window each.
 
-use super::field::{GainField, VoxelBox};
+use super::field::GainField;
+use super::layout::VoxelBox;
 use super::ray::{Camera, Ray, Tally};
 use super::{RayDensity, fixed, nats, ray_gain};
 use crate::belief::Prediction;

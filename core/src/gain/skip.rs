@@ -6,7 +6,7 @@
 //! shifted copies (a box of radius `r` widened by `s <= r` is covered by its two shifts by `s`).
 
 use super::code::FIRST_INFORMATIVE;
-use super::field::{Layout, VoxelBox};
+use super::layout::{Layout, VoxelBox};
 use crate::grid::Window;
 
 /// Free voxels to the side, by skip level.

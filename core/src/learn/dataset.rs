@@ -1,7 +1,7 @@
 //! Reading a data directory.
 
 use super::shard::{self, Entry};
-use super::{Card, Sample};
+use super::{Card, Record};
 use crate::files::names_in;
 use crate::grid::Grid;
 use crate::{Error, Result};
@@ -19,7 +19,7 @@ pub struct Dataset<S> {
     kind: PhantomData<fn() -> S>,
 }
 
-impl<S: Sample> Dataset<S> {
+impl<S: Record> Dataset<S> {
     /// Opens a directory and verifies every shard's checksum. Shards that are damaged are left out and named in
     /// [`Dataset::skipped`]; shards that were not made yet are ignored.
     ///

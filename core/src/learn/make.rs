@@ -33,19 +33,7 @@ pub fn make<S: Sample>(
     mine: Shard,
     progress: &(dyn Fn(Progress) + Sync),
 ) -> Result<Progress> {
-    if card.kind != S::KIND {
-        return Err(Error::Usage(format!("a card of {} for samples of {}", card.kind, S::KIND)));
-    }
-    std::fs::create_dir_all(directory).map_err(|error| Error::io(directory, error))?;
-    match Card::read(directory)? {
-        Some(there) => {
-            card.same_recipe(&there, directory)?;
-            if there.count < card.count {
-                card.write(directory)?;
-            }
-        }
-        None => card.write(directory)?,
-    }
+    card.begin(S::KIND, directory)?;
     let shards: Vec<usize> = (0..card.shard_count()).filter(|&file| mine.has(file)).collect();
     let of = shards.iter().map(|&shard| card.shard_samples(shard).len()).sum();
     let missing: Vec<usize> = shards.into_iter().filter(|&shard| !is_complete(card, directory, shard)).collect();

@@ -1,9 +1,9 @@
 //! Map samples: a settled random scene, what ten random views of it see, and the truth.
 
 use super::bytes::{Reader, put_set};
-use super::{Kind, Sample, VIEWS};
+use super::{Kind, Record, Sample, VIEWS};
 use crate::arm::ArmTool;
-use crate::camera::{MapObservation, NoiseModel, ViewArray, ViewId, project};
+use crate::camera::{MapObservation, NoiseModel, View, ViewArray, ViewId, project, render};
 use crate::grid::{Grid, VoxelSet};
 use crate::rng::{ChaCha8Rng, stream};
 use crate::scene::{Body, Catalog, GenerateConfig, Scene, Shelf, generate, rescale_if_room};
@@ -56,7 +56,7 @@ impl Recipe {
     }
 
     /// The scene of a sample, before it settles. One that is too full for its objects' stretches keeps their usual sizes.
-    fn scene(&self, seed: u64) -> Result<Scene> {
+    pub(super) fn scene(&self, seed: u64) -> Result<Scene> {
         let scene = generate(&self.catalog, &self.scenes, seed)?;
         if stream(seed, "sample stretch", 0).random::<f32>() >= self.stretch.share {
             return Ok(scene);
@@ -81,15 +81,13 @@ impl Recipe {
         let noisy = rng.random::<f32>() < self.noise_share;
         let noise = if noisy { NoiseModel::STANDARD } else { NoiseModel::OFF };
         let chosen = index::sample(&mut rng, self.views.views.len(), count);
-        Ok(chosen
-            .iter()
-            .enumerate()
-            .map(|(at, view)| {
-                let view = &self.views.views[view];
-                let image = noise.take(shelf, bodies, view, &self.views.intrinsics, seed, at as u64);
-                ViewSample { view: view.id, observation: project(&image, view, &self.views.intrinsics, shelf) }
-            })
-            .collect())
+        let sample = |(at, view): (usize, usize)| {
+            let view = &self.views.views[view];
+            let shoot = |view: &View| Ok(render(shelf, bodies, view, &self.views.intrinsics));
+            let frame = noise.apply(&noise.aim(view, seed, at as u64, shoot)?, seed, at as u64);
+            Ok(ViewSample { view: view.id, observation: project(&frame, shelf) })
+        };
+        chosen.iter().enumerate().map(sample).collect()
     }
 }
 
@@ -146,8 +144,6 @@ pub(super) fn take_views(reader: &mut Reader<'_>, ids: &[u16]) -> Option<Vec<Vie
 }
 
 impl Sample for MapSample {
-    const KIND: Kind = Kind::Maps;
-
     fn simulate(recipe: &Recipe, seed: u64) -> Result<Self> {
         let world = recipe.world(seed)?;
         let (grid, bodies) = (recipe.grid(), world.bodies());
@@ -155,6 +151,10 @@ impl Sample for MapSample {
         let views = recipe.look(world.shelf(), &bodies, VIEWS, seed)?;
         Ok(Self { seed, truth: occupied(&grid, &truth), labels: truth.labels, views })
     }
+}
+
+impl Record for MapSample {
+    const KIND: Kind = Kind::Maps;
 
     fn to_bytes(&self) -> Vec<u8> {
         let mut out = self.seed.to_le_bytes().to_vec();

@@ -13,14 +13,14 @@
 
 use super::bytes::{Reader, put_set};
 use super::maps::{occupied, put_views, take_views};
-use super::{Kind, Recipe, Sample, VIEWS, ViewSample};
+use super::{Kind, Recipe, Record, Sample, VIEWS, ViewSample};
 use crate::Result;
 use crate::arm::ArmTool;
 use crate::belief::{Belief, BeliefUpdate, Classical, FloorPlan, Intervention, SOLID};
 use crate::grid::{Grid, VoxelSet};
 use crate::rng::{derived_seed, stream};
 use crate::skill::push::{Push, PushSampler, SweptPush, sample};
-use crate::skill::{Candidate, Manipulation};
+use crate::skill::{Candidate, Manipulation, SweptManipulation};
 use crate::world::{TruthMap, World};
 use rand::Rng;
 
@@ -121,12 +121,12 @@ fn carry_out(world: &mut World, arm: &ArmTool, candidate: Candidate, as_done: bo
     if !outcome.dropped.is_empty() {
         return None;
     }
-    let (of, swept) = if as_done && outcome.stalled {
-        candidate.manipulation.as_done(&outcome, &arm.arm, grid)
+    let SweptManipulation { manipulation, swept } = if as_done && outcome.stalled {
+        candidate.manipulation.done(&outcome, &arm.arm, grid)
     } else {
-        (candidate.manipulation, candidate.swept)
+        SweptManipulation { manipulation: candidate.manipulation, swept: candidate.swept }
     };
-    match of {
+    match manipulation {
         Manipulation::Push(push) => Some(SweptPush { push, swept }),
         _ => None,
     }
@@ -151,8 +151,6 @@ fn put_padded(out: &mut Vec<u8>, views: &[ViewSample], count: usize, sample: &Pu
 }
 
 impl Sample for PushSample {
-    const KIND: Kind = Kind::Pushes;
-
     fn simulate(recipe: &Recipe, seed: u64) -> Result<Self> {
         let mut sample = Self::attempt(recipe, seed, seed)?;
         for attempt in 1..TRIES {
@@ -163,6 +161,10 @@ impl Sample for PushSample {
         }
         Ok(sample)
     }
+}
+
+impl Record for PushSample {
+    const KIND: Kind = Kind::Pushes;
 
     fn to_bytes(&self) -> Vec<u8> {
         let mut out = self.seed.to_le_bytes().to_vec();

@@ -14,6 +14,9 @@ const LEVEL: i32 = 5;
 /// No record is larger than this, bytes: what is promised beyond it is no record.
 const MAX_RECORD: usize = 1 << 30;
 
+/// Room that is made for a record before it is unpacked, at most, bytes.
+const MAX_PROMISED: usize = 1 << 24;
+
 /// The index of a shard, `shard-NNNNN.json`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Index {
@@ -114,7 +117,8 @@ pub(super) fn read(directory: &Path, shard: usize, entry: &Entry) -> Result<Vec<
     from.seek(SeekFrom::Start(entry.offset)).map_err(|error| Error::io(&file, error))?;
     let mut frame = vec![0; entry.length as usize];
     from.read_exact(&mut frame).map_err(bad)?;
-    let mut record = Vec::with_capacity(entry.record);
+    // What the index promises need not be there.
+    let mut record = Vec::with_capacity(entry.record.min(MAX_PROMISED));
     let decoder = zstd::Decoder::with_buffer(frame.as_slice()).map_err(bad)?;
     decoder.take(entry.record as u64 + 1).read_to_end(&mut record).map_err(bad)?;
     if record.len() != entry.record {

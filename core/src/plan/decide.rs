@@ -2,10 +2,9 @@
 
 use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 use super::weigh::{Weighed, random_push, weigh_clairvoyantly, weigh_pushes};
-use super::{Action, Counted, Decision, PlannerSettings, PolicyKind, Reason, Situation, gain_field, look};
+use super::{Action, Counted, Decision, Gain, PlannerSettings, PolicyKind, Reason, Rule, Situation};
 use crate::belief::Belief;
 use crate::camera::ViewId;
-use crate::gain::{RayDensity, gain_together};
 use crate::rng::stream;
 use crate::skill::PushTruth;
 use rand::Rng;
@@ -18,32 +17,22 @@ use rayon::prelude::*;
 pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situation<'_>) -> Decision {
     let (history, views) = (situation.history, situation.views);
     let step = history.actions.len();
-    let field = gain_field(situation.belief, situation.seen);
-    let ids: Vec<ViewId> = views.views.iter().map(|view| view.id).collect();
+    let gain = Gain::new(settings.counted, situation.belief, situation.seen);
     let offered = |view: &ViewId| !history.used_views.contains(view) && !situation.unreachable.contains(view);
-    let (gains, pair) = look::gains_and_pair(&field, views, &ids, offered);
-    let best_look = pair.map_or_else(|| fallback_view(situation), |pair| pair.first);
+    let looking = gain.of_looking(views, offered);
+    let best_look = looking.pair.map_or_else(|| fallback_view(situation), |pair| pair.first);
     let mut decision = Decision {
-        action: Action::Look { view: best_look },
-        reason: Reason::Schedule,
-        igv: 0.0,
-        igm: 0.0,
-        reg: 0.0,
-        pair: pair.map_or_else(Vec::new, |pair| std::iter::once(pair.first).chain(pair.second).collect()),
-        gains,
-        candidates: Vec::new(),
-        best_push: None,
-        motion: None,
-    };
-    decision.igv = match settings.counted {
-        Counted::All => pair.map_or(0.0, |pair| pair.total()),
-        Counted::Unseen => gain_together(&field, views, &decision.pair, RayDensity::gapless(field.grid(), views)),
+        igv: looking.igv,
+        pair: looking.views(),
+        gains: looking.gains,
+        rule: Some(Rule { policy, settings: *settings }),
+        ..Decision::unweighed(Action::Look { view: best_look }, Reason::Schedule)
     };
     let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
     let guard = || push_guard(history, situation.budget, complete(), settings);
     match policy {
         PolicyKind::Mem | PolicyKind::ClairvoyantPush => {
-            if let (Counted::All, true, Some(view)) = (settings.counted, history.just_pushed(), history.view_of_push) {
+            if let (Counted::All, true, Some(view)) = (gain.counted(), history.just_pushed(), history.view_of_push) {
                 decision.action = Action::Look { view };
                 decision.reason = Reason::ViewOfPush;
             } else if let Some(reason) = guard() {
@@ -51,10 +40,10 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
             } else if still_closing(history, settings) {
                 decision.reason = Reason::JustPushed;
             } else if policy == PolicyKind::ClairvoyantPush {
-                let (weighed, truth) = weigh_clairvoyantly(settings, situation, &field);
+                let (weighed, truth) = weigh_clairvoyantly(settings, situation, &gain);
                 choose_clairvoyantly(&mut decision, weighed, truth.as_ref(), settings, situation.belief);
             } else {
-                let weighed = weigh_pushes(settings, situation, &field);
+                let weighed = weigh_pushes(settings, situation, &gain);
                 choose(&mut decision, weighed, settings);
             }
         }

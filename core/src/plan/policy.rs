@@ -73,6 +73,11 @@ impl PolicyKind {
         !matches!(self, Self::RandomPush5Blind | Self::RandomViewPush5)
     }
 
+    /// Whether the policy asks what a look or a push would really bring, which only a simulation can tell.
+    pub fn knows_the_future(self) -> bool {
+        matches!(self, Self::Oracle | Self::ClairvoyantPush)
+    }
+
     /// Whether the policy draws at random (views, pushes, push candidates). The others do the same for every seed.
     pub fn is_seeded(self) -> bool {
         !matches!(self, Self::MemNoPush | Self::Oracle)

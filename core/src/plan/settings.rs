@@ -222,15 +222,18 @@ impl PlannerSettings {
         Ok(self)
     }
 
+    /// What is wrong with the first of these settings that is no value of its own, as a file may have them.
+    ///
+    /// # Errors
+    /// [`Error::Usage`]: names the option and what it may be.
+    pub fn check(&self) -> Result<()> {
+        SETTINGS.iter().try_for_each(|setting| setting.set(&mut { *self }, &setting.value(self)))
+    }
+
     /// The first setting in which these differ from those of `before`, with the value there and the one here.
     pub fn difference(&self, before: &Self) -> Option<(&'static Setting, String, String)> {
         let mut values = SETTINGS.iter().map(|setting| (setting, setting.value(before), setting.value(self)));
         values.find(|(_, before, now)| before != now)
-    }
-
-    /// What `IGM + gamma Reg` of a push has to reach where looking promises `igv`, nats.
-    pub fn asked_of_pushes(&self, igv: f32) -> f32 {
-        (self.patience * igv).max(self.push_floor)
     }
 }
 

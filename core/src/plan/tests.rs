@@ -11,6 +11,9 @@ use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 mod clairvoyant;
+mod kept;
+mod mem;
+mod policies;
 
 const BUDGET: usize = 20;
 
@@ -106,7 +109,7 @@ struct Table {
     update: Box<dyn BeliefUpdate>,
     views: ViewArray,
     arm: ArmTool,
-    seen: Option<VoxelSet>,
+    seen: VoxelSet,
     history: History,
     settings: PlannerSettings,
     seed: u64,
@@ -117,12 +120,13 @@ struct Table {
 
 impl Table {
     fn new() -> Self {
+        let belief = half_seen();
         Self {
-            belief: half_seen(),
+            seen: VoxelSet::empty(&belief.grid),
+            belief,
             update: Box::new(Classical),
             views: views(),
             arm: ArmTool::standard(Shelf::new([0.80, 0.40, 0.40])),
-            seen: None,
             history: History::default(),
             settings: PlannerSettings { candidates: 6, ..PlannerSettings::default() },
             seed: 7,
@@ -156,7 +160,7 @@ impl Table {
             arm: &self.arm,
             unreachable: &[],
             history: &self.history,
-            seen: self.seen.as_ref(),
+            seen: &self.seen,
             budget: BUDGET,
             seed: self.seed,
             really_look: &really_look,
@@ -180,6 +184,7 @@ impl Table {
             jammed: false,
             dropped: Vec::new(),
             toppled: Vec::new(),
+            shown: Vec::new(),
         }
     }
 
@@ -209,89 +214,6 @@ fn push() -> Push {
 }
 
 #[test]
-fn mem_looks_from_the_best_view_and_reports_all_gains() {
-    let mut table = Table::new();
-    let first = table.decide(PolicyKind::Mem);
-    let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
-    let gains = gain_of_views(&GainField::new(&table.belief), &table.views, &ids, RayDensity::FULL);
-    assert_eq!(first.gains, gains);
-    let best = (0..12).max_by(|&a, &b| gains[a].total_cmp(&gains[b])).expect("views");
-    assert_eq!(first.action, Action::Look { view: ViewId(best as u16) });
-    assert_eq!(first.pair[0], ViewId(best as u16));
-    assert_eq!(first.best_gain(), Some(gains[best]));
-    assert!(first.igv > gains[best] && first.pair.len() == 2);
-
-    // Used up, it is still reported, but not chosen.
-    table.history.record(&first, false);
-    let second = table.decide(PolicyKind::Mem);
-    assert_eq!(second.gains, first.gains);
-    assert!(!second.pair.contains(&ViewId(best as u16)));
-    assert_ne!(second.action, first.action);
-}
-
-#[test]
-fn mem_weighs_no_push_where_none_is_allowed() {
-    let check = |table: &Table, reason: Reason| {
-        let decision = table.decide(PolicyKind::Mem);
-        assert_eq!(decision.reason, reason);
-        assert!(!is_push(&decision) && decision.candidates.is_empty() && decision.best_push.is_none());
-        assert_eq!((decision.igm, decision.reg), (0.0, 0.0));
-    };
-    for step in 0..3 {
-        check(&Table::after_looks(step), Reason::TooEarly);
-    }
-    check(&Table::after_looks(BUDGET - 1), Reason::LastStep);
-    let mut dropped = Table::after_looks(6);
-    dropped.history.dropped = true;
-    check(&dropped, Reason::Dropped);
-    let mut complete = Table::after_looks(6);
-    complete.belief.semantics.iter_mut().for_each(|a| a[14] += 200.0);
-    check(&complete, Reason::MapComplete);
-    let mut pushed = Table::after_looks(6);
-    pushed.history.actions.push(Action::Manipulate(push().into()));
-    check(&pushed, Reason::JustPushed);
-}
-
-#[test]
-fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
-    let mut table = Table::after_looks(6);
-    table.update = Box::new(Prophet::Forgets);
-    let decision = table.decide(PolicyKind::Mem);
-    assert_eq!(decision.reason, Reason::PushTellsMore);
-    assert!(is_push(&decision) && decision.igm > decision.igv);
-    let best = &decision.candidates[decision.best_push.expect("a best push")];
-    assert_eq!(decision.action, Action::Manipulate(best.manipulation));
-    assert_eq!((best.gain, best.reg), (Some(decision.igm), Some(decision.reg)));
-
-    // The winner is scored in full: all views, all rays.
-    let blank = Belief::uniform(table.belief.grid);
-    let ids: Vec<ViewId> = table.views.views.iter().map(|view| view.id).collect();
-    let gains = gain_of_views(&GainField::new(&blank), &table.views, &ids, RayDensity::FULL);
-    let worth = best.view.expect("a view");
-    assert_eq!(decision.igm, gains[usize::from(worth.0)]);
-    assert!(gains.iter().all(|gain| *gain <= decision.igm));
-    // The others compare: same prediction, coarse rays, scaled.
-    for other in decision.candidates.iter().filter_map(|candidate| candidate.gain) {
-        assert!((other / decision.igm - 1.0).abs() < 0.1, "{other} {}", decision.igm);
-    }
-
-    table.history.used_views = vec![worth];
-    table.history.record(&decision, false);
-    assert!(table.history.used_views.is_empty(), "a push clears the used views");
-    let next = table.decide(PolicyKind::Mem);
-    assert_eq!((next.action, next.reason), (Action::Look { view: worth }, Reason::ViewOfPush));
-    assert!(next.candidates.is_empty());
-    // Where unseen voxels count, it looks where most is to be gained now: the push may have done something else.
-    let settings = table.settings;
-    table.settings = settings.counting(Counted::Unseen);
-    assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::JustPushed);
-    table.settings = settings;
-    table.history.record(&next, false);
-    assert_eq!(table.history.view_of_push, None);
-    assert_ne!(table.decide(PolicyKind::Mem).reason, Reason::ViewOfPush);
-}
-
-#[test]
 fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
     let mut table = Table::new();
     table.belief = Belief::uniform(table.belief.grid);
@@ -303,22 +225,22 @@ fn the_first_look_comes_from_above_where_only_unseen_voxels_count() {
     let highest = heights.iter().copied().fold(0.0, f32::max);
     assert!(heights.iter().any(|height| *height < highest - 0.05), "views of several heights");
     table.settings = table.settings.counting(Counted::Unseen);
-    table.seen = Some(VoxelSet::empty(&table.belief.grid));
     assert!((best_height(&table) - highest).abs() < 1e-6);
 
     // It is worth it for what it sees past the front: with p = 0.5 everywhere nothing of the back half would be reached.
     let nothing = VoxelSet::empty(&table.belief.grid);
     let view = table.decide(PolicyKind::MemNoPush).pair[0];
-    let share_of_back = |field: &GainField| {
+    let share_of_back = |sources: Vec<(usize, f32)>| {
         let grid = &table.belief.grid;
-        let sources = gain_sources(field, &table.views, view, RayDensity::FULL);
         let behind = |voxel: usize| 2 * usize::from(grid.voxel(voxel).y) >= grid.dims[1];
         let sum = |of: &dyn Fn(usize) -> bool| -> f32 { sources.iter().filter(|s| of(s.0)).map(|s| s.1).sum() };
         sum(&behind) / sum(&|_| true)
     };
-    let (standing, flat) = (gain_field(&table.belief, Some(&nothing)), GainField::new(&table.belief));
-    assert!(share_of_back(&standing) > 0.05, "{}", share_of_back(&standing));
-    assert!(share_of_back(&flat.with_seen(&nothing)) < 0.01);
+    let standing = Gain::new(Counted::Unseen, &table.belief, &nothing);
+    let share = share_of_back(standing.per_voxel(&table.views, view, RayDensity::FULL));
+    assert!(share > 0.05, "{share}");
+    let flat = GainField::new(&table.belief).with_seen(&nothing);
+    assert!(share_of_back(Coverage::new(&flat, &table.views, &[view], RayDensity::FULL).per_voxel(0)) < 0.01);
 }
 
 #[test]
@@ -331,7 +253,7 @@ fn where_only_unseen_voxels_count_each_counts_once() {
     (0..table.belief.grid.voxel_count()).step_by(2).for_each(|voxel| seen.insert(voxel));
     let field = field.with_seen(&seen);
     let coverage = Coverage::new(&field, &table.views, &ids, RayDensity::FULL);
-    table.seen = Some(seen);
+    table.seen = seen;
     let decision = table.decide(PolicyKind::MemNoPush);
     assert_eq!(decision.gains, coverage.gains());
     let offered = |view: &ViewId| !table.history.used_views.contains(view);
@@ -339,7 +261,8 @@ fn where_only_unseen_voxels_count_each_counts_once() {
     assert_eq!(decision.action, Action::Look { view: pair.first });
     assert_eq!(decision.pair, [pair.first, pair.second.expect("a second view")]);
     // What a view's gain comes from is counted alike.
-    let sources = gain_sources(&field, &table.views, pair.first, RayDensity::FULL);
+    let gain = Gain::new(Counted::Unseen, &table.belief, &table.seen);
+    let sources = gain.per_voxel(&table.views, pair.first, RayDensity::FULL);
     let sum: f64 = sources.iter().map(|(_, nats)| f64::from(*nats)).sum();
     assert!((sum / f64::from(pair.first_gain) - 1.0).abs() < 1e-4, "{sum} {}", pair.first_gain);
 }
@@ -371,7 +294,8 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let mut table = Table::after_looks(6);
     table.update = Box::new(Clears);
     table.settings = table.settings.counting(Counted::Unseen);
-    let field = GainField::new(&table.belief);
+    table.seen.insert(0);
+    let field = GainField::new(&table.belief).with_seen(&table.seen);
     let ids: Vec<ViewId> = (0..12).map(ViewId).collect();
     let decision = table.decide(PolicyKind::Mem);
     let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
@@ -379,8 +303,10 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let prediction = Clears.predict(&table.belief, &[swept(&table.belief)]).remove(0);
     let opened =
         Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(std::slice::from_ref(&prediction))[0];
-    let sources = push_sources(Counted::Unseen, &field, &table.views, &ids, &prediction, None);
-    let sum: f32 = sources.iter().map(|(_, nats)| nats).sum();
+    let gain = Gain::new(Counted::Unseen, &table.belief, &table.seen);
+    let sources = gain.push_sources(&table.views, &ids, &prediction, None).expect("it opens something");
+    assert_eq!(sources.words, "what it opens to all views together");
+    let sum: f32 = sources.nats.iter().map(|(_, nats)| nats).sum();
     assert!((sum - opened).abs() < 1e-3 * opened, "what the push opens is told by voxel: {sum}, {opened}");
     assert!(opened > 1.0 && decision.igm == opened, "{opened} {}", decision.igm);
     let best = &decision.candidates[decision.best_push.expect("a push")];
@@ -394,13 +320,42 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Manipulate(best.manipulation)));
 
     // What a push only blurs is worth nothing.
-    table.seen =
-        Some((0..table.belief.grid.voxel_count()).fold(VoxelSet::empty(&table.belief.grid), |mut all, voxel| {
-            all.insert(voxel);
-            all
-        }));
+    (0..table.belief.grid.voxel_count()).for_each(|voxel| table.seen.insert(voxel));
     table.update = Box::new(Prophet::Forgets);
     assert_eq!(table.decide(PolicyKind::Mem).igm, 0.0);
+}
+
+#[test]
+fn where_all_voxels_count_what_was_seen_makes_no_difference() {
+    let mut table = Table::after_looks(6);
+    let before = table.decide(PolicyKind::Mem);
+    (0..table.belief.grid.voxel_count()).for_each(|voxel| table.seen.insert(voxel));
+    assert_eq!(table.decide(PolicyKind::Mem), before);
+    table.settings = table.settings.counting(Counted::Unseen);
+    assert!(table.decide(PolicyKind::Mem).gains.iter().all(|gain| *gain == 0.0));
+}
+
+#[test]
+fn the_push_that_the_planner_holds_to_be_best_stands_on_top_by_whatever_it_is_best() {
+    for (policy, counted) in [
+        (PolicyKind::Mem, Counted::All),
+        (PolicyKind::Mem, Counted::Unseen),
+        (PolicyKind::ClairvoyantPush, Counted::All),
+        (PolicyKind::RandomPush5, Counted::All),
+    ] {
+        let mut table = Table::after_looks(if policy == PolicyKind::RandomPush5 { 4 } else { 6 });
+        table.settings = table.settings.counting(counted);
+        table.update = Box::new(Prophet::Forgets);
+        table.really = vec![[0, 0, 1], [0, 0, 2], [1, 0, 3]];
+        let decision = table.decide(policy);
+        let order = decision.ranked_candidates();
+        assert_eq!(order.first().copied(), decision.best_push, "{policy}, {counted}");
+        assert_eq!(order.len(), decision.candidates.len());
+        let best = |at: &usize| decision.candidates[*at].rejection.is_some();
+        assert!(order.is_sorted_by_key(best), "rejected ones come last");
+        let rule = Rule { policy, settings: table.settings };
+        assert_eq!((decision.rule, decision.comparison().reason), (Some(rule), decision.reason));
+    }
 }
 
 #[test]
@@ -455,81 +410,6 @@ fn mem_looks_when_no_push_is_feasible() {
 }
 
 #[test]
-fn a_policy_that_never_pushes_never_does() {
-    for policy in [PolicyKind::MemNoPush, PolicyKind::Random, PolicyKind::RandomCnabu] {
-        let mut table = Table::new();
-        table.update = Box::new(Prophet::Forgets);
-        let decisions = table.run(policy, 11);
-        assert!(decisions.iter().all(|d| !is_push(d) && d.reason == Reason::Schedule && d.candidates.is_empty()));
-        let mut seen = table.history.used_views.clone();
-        seen.sort();
-        seen.dedup();
-        assert_eq!(seen.len(), 11, "{policy}: no view twice");
-    }
-}
-
-#[test]
-fn random_views_follow_the_seed() {
-    let run = |policy, seed| {
-        let mut table = Table { seed, ..Table::new() };
-        table.run(policy, 8);
-        table.history.used_views
-    };
-    assert_eq!(run(PolicyKind::Random, 1), run(PolicyKind::Random, 1));
-    assert_eq!(run(PolicyKind::Random, 1), run(PolicyKind::RandomCnabu, 1), "they differ in the belief alone");
-    assert_ne!(run(PolicyKind::Random, 1), run(PolicyKind::Random, 2));
-    assert_ne!(run(PolicyKind::Random, 1), run(PolicyKind::MemNoPush, 1));
-}
-
-#[test]
-fn scheduled_policies_push_every_fifth_step_but_not_in_the_last() {
-    for policy in [PolicyKind::RandomPush5, PolicyKind::RandomPush5Blind, PolicyKind::RandomViewPush5] {
-        let mut table = Table::new();
-        let decisions = table.run(policy, BUDGET);
-        assert_eq!(pushes_at(&decisions), [5, 10, 15], "{policy}");
-        assert_eq!(decisions[BUDGET - 1].reason, Reason::LastStep);
-        assert!(decisions[..BUDGET - 1].iter().all(|d| d.reason == Reason::Schedule));
-        let pushed = &decisions[4];
-        let chosen = &pushed.candidates[pushed.best_push.expect("the push")];
-        assert_eq!((chosen.rejection.as_ref(), chosen.gain, pushed.igm), (None, None, 0.0));
-        let by_gain = decisions[5].action == Action::Look { view: decisions[5].pair[0] };
-        assert!(by_gain || policy == PolicyKind::RandomViewPush5, "{policy}");
-    }
-    let mut dropped = Table::after_looks(4);
-    dropped.history.dropped = true;
-    assert_eq!(dropped.decide(PolicyKind::RandomPush5).reason, Reason::Dropped);
-    let mut bare = Table::after_looks(4);
-    bare.belief = Belief::uniform(bare.belief.grid);
-    assert_eq!(bare.decide(PolicyKind::RandomPush5).reason, Reason::NoCandidate);
-}
-
-#[test]
-fn saturation_pushes_when_two_gains_in_a_row_are_alike() {
-    let mut table = Table::after_looks(6);
-    let gain = table.decide(PolicyKind::Saturation).best_gain().expect("a gain");
-    let mut with = |previous: f32, steps: usize| {
-        table.history.actions = vec![Action::Look { view: ViewId(0) }; steps];
-        table.history.best_gains = vec![1e9, previous];
-        let decision = table.decide(PolicyKind::Saturation);
-        (is_push(&decision), decision.reason)
-    };
-    assert_eq!(with(gain * 1.01, 6), (true, Reason::Schedule));
-    assert_eq!(with(gain * 1.05, 6), (false, Reason::Schedule));
-    assert_eq!(with(gain * 1.01, 2), (false, Reason::TooEarly));
-    assert_eq!(with(gain * 1.01, BUDGET - 1), (false, Reason::LastStep));
-    assert!(!is_push(&Table::after_looks(6).decide(PolicyKind::Saturation)), "no gain to compare with");
-}
-
-#[test]
-fn the_oracle_takes_the_view_that_really_tells_most() {
-    let mut table = Table::new();
-    let first = table.decide(PolicyKind::Oracle);
-    assert_eq!((first.action, first.reason), (Action::Look { view: ViewId(9) }, Reason::Schedule));
-    table.history.record(&first, false);
-    assert_eq!(table.decide(PolicyKind::Oracle).action, Action::Look { view: ViewId(11) });
-}
-
-#[test]
 fn a_map_that_has_nothing_left_to_tell_is_still_looked_at() {
     let mut table = Table::new();
     table.belief.occupancy.fill(evidence(-3.5, 40.0));
@@ -552,45 +432,4 @@ fn decisions_do_not_depend_on_the_number_of_threads() {
     for policy in PolicyKind::ALL {
         assert_eq!(on(1, policy), on(3, policy), "{policy}");
     }
-}
-
-#[test]
-fn a_history_takes_down_what_was_done() {
-    let table = Table::new();
-    let look = table.decide(PolicyKind::MemNoPush);
-    let mut history = History::default();
-    history.record(&look, false);
-    assert_eq!((history.actions.len(), history.used_views.len()), (1, 1));
-    assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
-
-    let candidate = CandidateRecord { gain: Some(1.0), view: Some(ViewId(3)), ..CandidateRecord::of(push()) };
-    let pushed = Decision {
-        action: Action::Manipulate(push().into()),
-        candidates: vec![candidate],
-        best_push: Some(0),
-        ..look.clone()
-    };
-    history.record(&pushed, false);
-    assert!(history.just_pushed() && history.used_views.is_empty());
-    assert_eq!((history.view_of_push, history.best_gains.len()), (Some(ViewId(3)), 1));
-    // A push by hand is not the one that was weighed; after a drop there is nothing to look at.
-    let by_hand = Push { length_m: 0.07, ..push() };
-    history.record(&Decision { action: Action::Manipulate(by_hand.into()), ..pushed.clone() }, false);
-    assert_eq!((history.view_of_push, history.dropped), (None, false));
-    history.record(&pushed, true);
-    assert_eq!((history.view_of_push, history.dropped), (None, true));
-    history.record(&look, false);
-    assert!(history.dropped, "a drop is for ever");
-}
-
-#[test]
-fn a_decision_survives_its_file() {
-    let mut table = Table::after_looks(6);
-    table.update = Box::new(Prophet::Forgets);
-    let decision = table.decide(PolicyKind::Mem);
-    let json = serde_json::to_value(&decision).expect("json");
-    assert_eq!(json["action"]["kind"], "push");
-    assert!(json["action"]["start"].is_array() && json["action"]["length_m"].is_number());
-    assert_eq!(json["reason"], "push_tells_more");
-    assert_eq!(serde_json::from_value::<Decision>(json).expect("back"), decision);
 }

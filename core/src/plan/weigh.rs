@@ -1,16 +1,12 @@
 //! The worth of pushes: IGM and Reg of every candidate.
 
-use super::{CandidateRecord, Counted, PlannerSettings, Situation, look};
+use super::worth::Worth;
+use super::{CandidateRecord, Gain, PlannerSettings, Situation};
 use crate::arm::PhasedMotion;
 use crate::belief::{Belief, FloorPlan, Intervention, Prediction, SOLID};
-use crate::camera::{ViewArray, ViewId};
-use crate::gain::{GainField, Openings, RayDensity, RayGains, gain_of_views, gain_per_voxel};
 use crate::rng::stream;
 use crate::skill::{Candidate, Ground, PushSampler, PushTruth, SkillSet, random_candidate};
 use rayon::prelude::*;
-
-/// About how many views rank the candidates: every 5th of 300, all of an array that has fewer than twice as many.
-pub const COARSE_VIEWS: usize = 60;
 
 /// The pushes that were weighed.
 pub(super) struct Weighed {
@@ -43,14 +39,8 @@ pub fn disturbance(belief: &Belief, prediction: &Prediction) -> f32 {
     prediction.semantic_entropy_drop(belief).min(0.0) as f32
 }
 
-/// Draws candidates and weighs the feasible ones.
-///
-/// Where all voxels count, a push is worth the best single view after it: a coarse ranking first, then the winner with
-/// all views and rays. A coarse gain is multiplied by the ratio of ray counts (4), so that it compares with exact ones.
-/// A push clears the list of used views, so every view counts. Where only unseen voxels count, a push is worth what it
-/// opens to the coarse views together ([`Openings`]), and the best of these views after the winner is reported for
-/// display only.
-pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, field: &GainField) -> Weighed {
+/// Draws candidates and weighs the feasible ones. The best is the one of most worth, the first of equals.
+pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, gain: &Gain) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
     let actions = situation.history.actions.len();
     let drawn = draw_candidates(settings, &situation.ground(settings), situation.seed, actions);
@@ -63,12 +53,12 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         .filter(|(_, candidate)| candidate.rejection.is_none())
         .map(|(at, candidate)| {
             let skill = candidate.manipulation.skill();
-            (at, skill.intervention(belief, &solid, &situation.arm.arm, candidate.swept))
+            (at, skill.intervention(belief, &solid, candidate.swept))
         })
         .unzip();
 
     let offered = situation.offered();
-    let worth = Worth::new(settings.counted, field, views, coarse(&offered));
+    let worth = Worth::new(gain, views, &offered);
     let predictions = update.predict(belief, &interventions);
     let mut best: Option<(usize, &Prediction)> = None;
     for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(&feasible) {
@@ -80,18 +70,7 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
         }
     }
     let best = best.map(|(at, prediction)| {
-        let after = field.with_prediction(prediction);
-        match &worth {
-            Worth::View(..) => {
-                let gains = gain_of_views(&after, views, &offered, RayDensity::FULL);
-                let (view, gain) = best_view(&offered, &gains);
-                (candidates[at].view, candidates[at].gain) = (view, Some(gain));
-            }
-            Worth::Opened(_, coarse) => {
-                let gains = look::gains(&after, views, coarse, RayDensity::COARSE);
-                candidates[at].view = best_view(coarse, &gains).0;
-            }
-        }
+        worth.complete(prediction, &mut candidates[at]);
         at
     });
     Weighed { candidates, best, motions }
@@ -102,7 +81,7 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
 pub(super) fn weigh_clairvoyantly(
     settings: &PlannerSettings,
     situation: &Situation<'_>,
-    field: &GainField,
+    gain: &Gain,
 ) -> (Weighed, Option<PushTruth>) {
     let mut weighed = weigh_pushes(settings, situation, field);
     let (at, motions): (Vec<usize>, Vec<PhasedMotion>) =
@@ -118,71 +97,11 @@ pub(super) fn weigh_clairvoyantly(
     (weighed, best.map(|(_, truth)| truth))
 }
 
-/// The views that rank the candidates, of those that are offered.
-fn coarse(offered: &[ViewId]) -> Vec<ViewId> {
-    offered.iter().copied().step_by((offered.len() / COARSE_VIEWS).max(1)).collect()
-}
-
-/// Where a push's worth comes from under its prediction: voxel positions and their nats, in ascending order of position.
-/// `field` is that of the belief before it, `offered` the views that count.
-///
-/// Where all voxels count it is the gain of `best`, the best view after the push, and nothing without one. Where only
-/// unseen voxels count it is what the push opens to all views together, as [`CandidateRecord::gain`] has it.
-pub fn push_sources(
-    counted: Counted,
-    field: &GainField,
-    array: &ViewArray,
-    offered: &[ViewId],
-    prediction: &Prediction,
-    best: Option<ViewId>,
-) -> Vec<(usize, f32)> {
-    match (counted, best) {
-        (Counted::All, None) => Vec::new(),
-        (Counted::All, Some(best)) => gain_per_voxel(&field.with_prediction(prediction), array, best, RayDensity::FULL),
-        (Counted::Unseen, _) => Openings::new(field, array, &coarse(offered), RayDensity::COARSE).per_voxel(prediction),
-    }
-}
-
-/// What makes a push worth it, and what is computed once for all candidates.
-enum Worth {
-    /// The best of some single views afterwards.
-    View(RayGains, Vec<ViewId>),
-    /// What it opens to some views together.
-    Opened(Openings, Vec<ViewId>),
-}
-
-impl Worth {
-    fn new(counted: Counted, field: &GainField, array: &ViewArray, coarse: Vec<ViewId>) -> Self {
-        match counted {
-            Counted::All => Self::View(RayGains::new(field, array, &coarse, RayDensity::COARSE), coarse),
-            Counted::Unseen => Self::Opened(Openings::new(field, array, &coarse, RayDensity::COARSE), coarse),
-        }
-    }
-
-    /// The view that counts, if it is one, and the worth in nats, of every predicted push.
-    fn of_each(&self, predictions: &[Prediction]) -> Vec<(Option<ViewId>, f32)> {
-        match self {
-            Self::View(rays, coarse) => {
-                let scale = (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2);
-                let of = |prediction| {
-                    let (view, gain) = best_view(coarse, &rays.under(prediction));
-                    (view, gain * scale)
-                };
-                predictions.par_iter().map(of).collect()
-            }
-            Self::Opened(openings, _) => {
-                openings.under_each(predictions).into_iter().map(|gain| (None, gain)).collect()
-            }
-        }
-    }
-}
-
-/// Draws one feasible manipulation at random, pushes from the frontier as in the paper, with those that were rejected on the
-/// way.
-pub(super) fn random_push(situation: &Situation<'_>, skills: SkillSet) -> Weighed {
-    let (belief, arm, actions) = (situation.belief, situation.arm, situation.history.actions.len());
-    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier };
-    let drawn = random_candidate(skills, &ground, situation.seed, actions);
+/// Draws one feasible push at random, from the frontier as in the paper, with those that were rejected on the way.
+pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
+    let (belief, arm) = (situation.belief, situation.arm);
+    let mut rng = push_stream(situation.seed, situation.history.actions.len());
+    let drawn = sample(PushSampler::Frontier, belief, None, arm, 1, &mut rng);
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
     let motions = drawn.into_iter().map(|drawn| drawn.motion).collect();
@@ -193,12 +112,4 @@ fn record_of(candidate: &Candidate, situation: &Situation<'_>) -> CandidateRecor
     let rejection = candidate.rejection.clone();
     let motion_s = candidate.motion.as_ref().map(|motion| motion.duration_s(&situation.arm.arm));
     CandidateRecord { rejection, motion_s, ..CandidateRecord::of(candidate.manipulation) }
-}
-
-/// The view with the largest gain, the first of equals, and that gain; no view and 0 without views.
-fn best_view(ids: &[ViewId], gains: &[f32]) -> (Option<ViewId>, f32) {
-    let better = |best: (Option<ViewId>, f32), (&id, &gain): (&ViewId, &f32)| {
-        if best.0.is_none() || gain > best.1 { (Some(id), gain) } else { best }
-    };
-    ids.iter().zip(gains).fold((None, 0.0), better)
 }

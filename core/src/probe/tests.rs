@@ -91,8 +91,9 @@ fn the_push_that_was_made_does_the_same_again_and_the_episode_stays_as_it_is() {
     let probe = &probes[0];
     assert_eq!((probe.step, probe.chosen, probe.made, probe.agrees), (5, Some(0), Some(0), Some(true)));
     let logged = &record.steps[4];
-    assert!(logged.displacement_m > 0.01);
-    assert_eq!(probe.pushes[0].displacement_m.to_bits(), logged.displacement_m.to_bits());
+    let moved_m = logged.displacement_m().expect("a truth");
+    assert!(moved_m > 0.01);
+    assert_eq!(probe.pushes[0].displacement_m.to_bits(), moved_m.to_bits());
     let report = logged.push.as_ref().expect("a push");
     assert_eq!((probe.pushes[0].pushed_m, probe.pushes[0].jammed), (report.pushed_m, report.stalled));
 }

@@ -1,9 +1,10 @@
 //! What makes a scene sound: known classes, finite numbers, everything inside the shelf, nothing overlapping.
 
-use super::file::Places;
+use super::lines::Places;
 use super::overlap::PlacedBody;
 use super::{Body, Catalog, Object, Scene, Shelf, Warning};
 use crate::Result;
+use std::path::Path;
 
 /// Most voxels a scene's grid may have.
 pub const MAX_VOXELS: usize = 10_000_000;
@@ -106,6 +107,33 @@ pub(super) fn check(scene: &Scene, catalog: &Catalog, places: &Places) -> Result
     Ok(warnings)
 }
 
+impl Scene {
+    /// Checks the numbers of a scene that lies within another file (an episode, a bench): the size of the shelf and its grid,
+    /// the count of objects, and where everything is. `path` is the file that errors name. Whether objects overlap is not
+    /// asked again.
+    ///
+    /// # Errors
+    /// For numbers that no scene file may have.
+    pub fn check_numbers(&self, path: &Path) -> Result<()> {
+        check_numbers(self, &Places::without_file(path))
+    }
+}
+
+fn check_numbers(scene: &Scene, places: &Places) -> Result<()> {
+    check_shelf(&scene.shelf, places)?;
+    if let Some(fault) = scene.robot.fault(&scene.shelf) {
+        return Err(places.key("robot.base", fault));
+    }
+    if scene.objects.len() > MAX_OBJECTS {
+        let message = format!("{} objects; the limit is {MAX_OBJECTS}", scene.objects.len());
+        return Err(places.file(message));
+    }
+    if let Some(key) = scene.meshes.keys().find(|key| !is_finite(scene, key)) {
+        return Err(places.mesh(key, "its convex parts have corners that are nowhere"));
+    }
+    scene.objects.iter().enumerate().try_for_each(|(at, object)| check_placement(scene, at, object, places))
+}
+
 fn check_name(scene: &Scene, places: &Places) -> Result<()> {
     let wrong = |c: char| c.is_control() || matches!(c, '/' | '\\' | ':' | '"');
     if scene.name.is_empty() || scene.name.len() > 100 || scene.name.contains(wrong) || scene.name.starts_with('.') {
@@ -149,11 +177,15 @@ fn check_mesh_key(scene: &Scene, catalog: &Catalog, key: &str, places: &Places) 
     if !is_class && !is_file {
         return Err(places.mesh(key, unknown_class(catalog, key)));
     }
-    let finite = scene.meshes[key].parts.iter().flatten().flatten().all(|v| v.abs() < FAR_M);
-    if !finite || scene.meshes[key].solid().parts.is_empty() {
+    if !is_finite(scene, key) || scene.meshes[key].solid().parts.is_empty() {
         return Err(places.mesh(key, "its convex parts have no volume"));
     }
     Ok(())
+}
+
+/// Whether all corners of a mesh are near enough to be numbers.
+fn is_finite(scene: &Scene, key: &str) -> bool {
+    scene.meshes[key].parts.iter().flatten().flatten().all(|v| v.abs() < FAR_M)
 }
 
 fn check_object(scene: &Scene, catalog: &Catalog, at: usize, object: &Object, places: &Places) -> Result<()> {
@@ -161,6 +193,15 @@ fn check_object(scene: &Scene, catalog: &Catalog, at: usize, object: &Object, pl
     if catalog.by_name(&object.class).is_none() {
         return wrong("class", unknown_class(catalog, &object.class));
     }
+    check_placement(scene, at, object, places)?;
+    match &object.mesh {
+        Some(key) if !scene.meshes.contains_key(key) => wrong("mesh", format!("mesh `{key}` is not in the scene")),
+        _ => Ok(()),
+    }
+}
+
+fn check_placement(scene: &Scene, at: usize, object: &Object, places: &Places) -> Result<()> {
+    let wrong = |key: &str, message: String| Err(places.object(scene, at, key, message));
     if !object.position.iter().all(|v| v.abs() < FAR_M) {
         let [x, y] = object.position;
         return wrong("position", format!("position [{x}, {y}]: must be two finite numbers of metres in the shelf"));
@@ -173,10 +214,7 @@ fn check_object(scene: &Scene, catalog: &Catalog, at: usize, object: &Object, pl
         let [x, y, z] = object.scale;
         return wrong("scale", format!("scale [{x}, {y}, {z}]: each factor must be {low} to {high}"));
     }
-    match &object.mesh {
-        Some(key) if !scene.meshes.contains_key(key) => wrong("mesh", format!("mesh `{key}` is not in the scene")),
-        _ => Ok(()),
-    }
+    Ok(())
 }
 
 pub(super) fn unknown_class(catalog: &Catalog, name: &str) -> String {

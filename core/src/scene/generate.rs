@@ -4,11 +4,15 @@
 //! 180 degrees for every class, a point of a fine floor grid where some class can stand, and a class among those that can
 //! (affinities of the objects within whose radius of influence the point lies). Where a class can stand is what remains
 //! of the floor after the Minkowski sums of its mirrored footprint and every placed one ([`placeable`]). The regularity
-//! `rho` makes points in front of and behind placed objects likelier.
+//! `rho` makes points in front of and behind placed objects likelier. Before that a [`Family`] may place a structure.
 
+mod family;
 mod placeable;
+mod structure;
 
-use super::file::Places;
+pub use family::Family;
+
+use super::lines::Places;
 use super::{
     Catalog, Class, ClassId, MeshShape, OBJECT_CLASS_COUNT, Object, RobotPlacement, Scene, Shelf, check, outline,
 };
@@ -40,6 +44,8 @@ pub struct GenerateConfig {
     pub fill: [f32; 2],
     /// Regularity in 0 to 1: how strongly objects line up behind placed ones.
     pub rho: f32,
+    /// What is placed before the rest is filled at random.
+    pub family: Family,
     /// The shelf.
     pub shelf: Shelf,
     /// Classes to place; empty for all.
@@ -56,6 +62,7 @@ impl Default for GenerateConfig {
         Self {
             fill: [0.30, 0.45],
             rho: 0.0,
+            family: Family::Mixed,
             shelf: Shelf::new([0.80, 0.40, 0.40]),
             classes: Vec::new(),
             keep: Vec::new(),
@@ -65,6 +72,11 @@ impl Default for GenerateConfig {
 }
 
 impl GenerateConfig {
+    /// Shelves of a family with its usual fill and regularity.
+    pub fn of_family(family: Family) -> Self {
+        Self { family, fill: family.fill(), rho: family.rho(), ..Self::default() }
+    }
+
     /// Generates around what a scene holds.
     pub fn around(scene: &Scene) -> Self {
         Self { shelf: scene.shelf, keep: scene.objects.clone(), meshes: scene.meshes.clone(), ..Self::default() }
@@ -133,6 +145,8 @@ pub fn generate(catalog: &Catalog, config: &GenerateConfig, seed: u64) -> Result
         let outline = outline::placed(&grown, object.position, object.yaw_deg);
         standing.push(Standing { class: body.class, position: object.position, outline });
     }
+    let structured = stream(seed, "scene structure", 0);
+    structure::Builder::new(catalog, config, &mut scene.objects, &mut standing, structured).build(config.family);
     let mut fill = scene.fill(catalog)?;
     let target = config.target_fill(seed);
     let mut rng = stream(seed, "scene objects", 0);

@@ -4,6 +4,7 @@
 //! Ghorbel 2009). A mesh keeps its own direction about z; [`MeshReport::footprint`] tells by how much it is turned.
 
 mod glb;
+mod group;
 mod obj;
 mod parts;
 mod read;
@@ -17,13 +18,13 @@ use super::{Class, MeshShape, Warning};
 use crate::solid::{Bounds, ConvexPart, Solid};
 use crate::wall::guarded;
 use crate::{Error, Point, Result};
-use read::Corner;
+use group::Corner;
 use serde::Serialize;
 use std::path::Path;
 use topology::{Component, Fault};
 
+pub use group::MAX_TRIANGLES;
 pub use parts::MAX_PART_VERTICES;
-pub use read::MAX_TRIANGLES;
 pub use unit::Unit;
 
 /// Density of a mesh whose class is not known: packed groceries, kg per cubic metre.
@@ -101,7 +102,7 @@ pub fn load_mesh(
     let wrong = |message: String| Error::input(path, "", message);
     let groups = read::read(path)?;
     let triangles: usize = groups.iter().map(|group| group.triangles.len()).sum();
-    let Some([low, high]) = read::bounds(&groups) else {
+    let Some([low, high]) = group::bounds(&groups) else {
         return Err(wrong("the mesh is empty (no triangles)".into()));
     };
     let mut warnings = Vec::new();

@@ -8,13 +8,17 @@
 //! * Space: voxels that no look has seen, that no view reaches before the push and one reaches after it ([`TrueReach`]). What was
 //!   inside an object before is not counted: that it is free now is no news of anything else. All views, one ray in
 //!   [`REACH_DENSITY`] pixels along both axes: rays of many views fill each other's gaps.
+//!
+//! A push moves few objects. So only what they were before, what they come before, and they themselves are looked at again
+//! ([`HiddenWatch`], [`TrueReach::after`]); the result is the same as that of looking at everything.
 
 use crate::arm::{ArmTool, PhasedMotion};
 use crate::belief::{Belief, bernoulli_entropy, beta_mean};
-use crate::camera::{ViewArray, hidden_objects};
+use crate::camera::{HiddenWatch, ViewArray};
 use crate::gain::{RayDensity, TrueReach};
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::{Body, ObjectId};
+use crate::solid::Bounds;
 use crate::world::{TruthMap, World};
 use crate::{Pose, Vector};
 use rayon::prelude::*;
@@ -43,12 +47,22 @@ pub struct PushTruth {
     pub dropped: Vec<ObjectId>,
     /// Objects that stood and no longer do, dropped ones left out.
     pub toppled: Vec<ObjectId>,
+    /// How many voxels of each object a view reaches after it, of every fourth view of the array, in the scene's order; 0 of
+    /// dropped ones.
+    pub shown: Vec<u32>,
 }
 
 impl PushTruth {
     /// Objects won minus objects lost.
     pub fn balance(&self) -> i32 {
         self.won.len() as i32 - self.lost.len() as i32
+    }
+
+    /// Object voxels that come into sight and that go out of it: over all objects, by how much what is shown of each grows
+    /// or shrinks from `before`, which is [`Counterfactual::shown`].
+    pub fn appeared_and_vanished(&self, before: &[u32]) -> [u32; 2] {
+        let pairs = || before.iter().zip(&self.shown);
+        [pairs().map(|(a, b)| b.saturating_sub(*a)).sum(), pairs().map(|(a, b)| a.saturating_sub(*b)).sum()]
     }
 
     /// What is unknown of the space that it opens under a belief, nats.
@@ -62,11 +76,13 @@ impl PushTruth {
 pub struct Counterfactual<'a> {
     world: &'a World,
     arm: &'a ArmTool,
-    views: &'a ViewArray,
     grid: Grid,
     bodies: Vec<Body>,
     hidden: Vec<ObjectId>,
+    watch: HiddenWatch<'a>,
     reach: TrueReach,
+    /// How many voxels of each body a view reaches.
+    shown: Vec<u32>,
     /// Voxels that no push opens: seen, or inside an object.
     known: VoxelSet,
 }
@@ -78,16 +94,20 @@ impl<'a> Counterfactual<'a> {
         let truth = TruthMap::of(&grid, &bodies);
         let mut known = seen.clone();
         truth.occupancy.iter().enumerate().filter(|(_, filled)| **filled != 0).for_each(|(at, _)| known.insert(at));
-        Self {
-            hidden: hidden_objects(world.shelf(), &bodies, views),
-            reach: TrueReach::new(&grid, &truth, views, REACH_DENSITY),
-            world,
-            arm,
-            views,
-            grid,
-            bodies,
-            known,
-        }
+        let watch = HiddenWatch::new(world.shelf(), &bodies, views);
+        let reach = TrueReach::new(&grid, &truth, views, REACH_DENSITY);
+        let shown = in_order(&bodies, &reach.shown(&TruthMap::owners(&grid, &bodies), ids(&bodies)));
+        Self { hidden: watch.hidden(), watch, reach, shown, world, arm, grid, bodies, known }
+    }
+
+    /// The bodies as they stand now, dropped ones left out.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// How many voxels of each body a view reaches now, in the order of [`Self::bodies`].
+    pub fn shown(&self) -> &[u32] {
+        &self.shown
     }
 
     /// The objects that no view shows now, in the scene's order.
@@ -109,13 +129,14 @@ impl<'a> Counterfactual<'a> {
             jammed: outcome.stalled,
             dropped: outcome.dropped,
             toppled: Vec::new(),
+            shown: self.shown.clone(),
         };
         let now = |id: ObjectId| after.iter().find(|body| body.id == id);
         let stays = |body: &Body| now(body.id).is_some_and(|now| now.world_from_body == body.world_from_body);
         if self.bodies.iter().all(stays) {
             return truth;
         }
-        let hidden = hidden_objects(world.shelf(), &after, self.views);
+        let hidden = self.watch.hidden_after(&after);
         for body in &self.bodies {
             let was_hidden = self.hidden.contains(&body.id);
             match now(body.id) {
@@ -128,7 +149,13 @@ impl<'a> Counterfactual<'a> {
                 truth.toppled.push(body.id);
             }
         }
-        truth.opened = self.reach.opened(&TruthMap::of(&self.grid, &after));
+        let moved = after.iter().filter(|now| {
+            !self.bodies.iter().any(|body| body.id == now.id && body.world_from_body == now.world_from_body)
+        });
+        let filled: Vec<Bounds> = moved.map(|body| body.solid.bounds_at(&body.world_from_body)).collect();
+        let reach = self.reach.after(&TruthMap::of(&self.grid, &after), &filled);
+        truth.shown = in_order(&self.bodies, &reach.shown(&TruthMap::owners(&self.grid, &after), ids(&self.bodies)));
+        truth.opened = reach.opened;
         truth.opened.subtract(&self.known);
         truth
     }
@@ -143,6 +170,16 @@ impl<'a> Counterfactual<'a> {
         };
         motions.par_iter().with_max_len(1).map(carried_out).collect()
     }
+}
+
+/// One more than the largest id of some bodies.
+fn ids(bodies: &[Body]) -> usize {
+    bodies.iter().map(|body| usize::from(body.id.0) + 1).max().unwrap_or(0)
+}
+
+/// What is known by id, in the order of some bodies.
+fn in_order(bodies: &[Body], by_id: &[u32]) -> Vec<u32> {
+    bodies.iter().map(|body| by_id[usize::from(body.id.0)]).collect()
 }
 
 /// Whether an object at a pose stands more than it lies.
@@ -211,6 +248,19 @@ mod tests {
         assert!(truth.opened.contains(at(-0.085, 0.215)));
         assert!(!truth.opened.contains(at(-0.04, 0.23)) && !truth.opened.contains(at(-0.085, 0.16)));
         assert!(truth.opened.len() > 200, "{}", truth.opened.len());
+
+        // The same as by looking at everything anew.
+        let (mut pushed, owners_of) = (world.clone(), |bodies: &[Body]| TruthMap::owners(&grid, bodies));
+        pushed.execute(&arm.arm, &aside);
+        let anew = TrueReach::new(&grid, &TruthMap::of(&grid, &pushed.bodies()), &views, REACH_DENSITY);
+        assert_eq!(truth.shown, anew.shown(&owners_of(&pushed.bodies()), 3));
+        assert_eq!(crate::camera::hidden_objects(pushed.shelf(), &pushed.bodies(), &views), [ObjectId(2)]);
+        let [appeared, vanished] = truth.appeared_and_vanished(known.shown());
+        assert!(appeared > 20 && vanished > 20, "{appeared} {vanished}");
+        let mut opened = anew.reached();
+        opened.subtract(&known.reach.reached());
+        opened.subtract(&known.known);
+        assert!(truth.opened == opened);
 
         // What was seen already is not opened; half of the shelf as if it had been.
         let mut left = nothing.clone();

@@ -216,7 +216,7 @@ impl Skill for Drag {
 
     /// The object comes along as a whole, without turning. It comes to stand under what the arm swept on its way over it, and
     /// leaves from under it: where the arm only passed above it, it tells nothing of what stands there afterwards.
-    fn intervention(&self, belief: &Belief, solid: &FloorPlan, _arm: &Arm, mut swept: VoxelSet) -> Intervention {
+    fn intervention(&self, belief: &Belief, solid: &FloorPlan, mut swept: VoxelSet) -> Intervention {
         let (grid, stroke) = (&belief.grid, self.stroke());
         let Some((first, target)) = self.target(solid, grid) else {
             return Intervention { swept, flow: Flow::nothing(), stroke };

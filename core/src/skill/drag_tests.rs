@@ -81,7 +81,7 @@ fn what_is_dragged_is_believed_nearer_to_the_entrance_and_gone_from_where_it_sto
     let candidate = candidates.iter().find(|candidate| candidate.rejection.is_none()).expect("a feasible one");
     let Manipulation::Drag(drag) = candidate.manipulation else { panic!("no drag") };
     let solid = FloorPlan::new(&belief, SOLID);
-    let intervention = drag.intervention(&belief, &solid, &arm.arm, candidate.swept.clone());
+    let intervention = drag.intervention(&belief, &solid, candidate.swept.clone());
     let ways: Vec<[f32; 2]> = intervention.flow.displacement_m.iter().flatten().copied().collect();
     assert_eq!(ways.len(), 20 * 12, "all cells of the box");
     assert!(ways.iter().all(|way| *way == ways[0] && way[1] < -0.01), "as a whole towards the entrance: {:?}", ways[0]);

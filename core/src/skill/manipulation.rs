@@ -8,20 +8,32 @@ use crate::rng::stream;
 use crate::world::ManipulationOutcome;
 use rand::Rng;
 
-impl Manipulation {
-    /// What a belief update is told of it as far as the arm really came, with what the arm swept until then.
-    pub fn done(&self, outcome: &ManipulationOutcome, arm: &Arm, belief: &Belief) -> Intervention {
-        let (done, swept) = self.as_done(outcome, arm, &belief.grid);
-        done.skill().intervention(belief, &FloorPlan::new(belief, SOLID), arm, swept)
-    }
+/// A manipulation and the voxels that the arm sweeps with it: all that a belief update's [`Intervention`] is made of, in
+/// whatever belief.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SweptManipulation {
+    /// The manipulation.
+    pub manipulation: Manipulation,
+    /// Every voxel that gripper or links touch, approach included.
+    pub swept: VoxelSet,
+}
 
-    /// It as far as the arm really came, and what the arm swept until then.
-    pub fn as_done(&self, outcome: &ManipulationOutcome, arm: &Arm, grid: &Grid) -> (Self, VoxelSet) {
+impl SweptManipulation {
+    /// What a belief update is told of it in a belief.
+    pub fn intervention(&self, belief: &Belief) -> Intervention {
+        let solid = FloorPlan::new(belief, SOLID);
+        self.manipulation.skill().intervention(belief, &solid, self.swept.clone())
+    }
+}
+
+impl Manipulation {
+    /// It as far as the arm really came, with what the arm swept until then.
+    pub fn done(&self, outcome: &ManipulationOutcome, arm: &Arm, grid: &Grid) -> SweptManipulation {
         let mut swept = VoxelSet::empty(grid);
         arm.sweep(&outcome.passed, grid, &mut swept);
         let skill = self.skill();
         let way_m = if outcome.stalled { outcome.way_m.min(skill.way_m()) } else { skill.way_m() };
-        (skill.shortened(way_m), swept)
+        SweptManipulation { manipulation: skill.shortened(way_m), swept }
     }
 }
 
@@ -33,7 +45,7 @@ pub fn intended(arm: &ArmTool, belief: &Belief, manipulation: &Manipulation) -> 
         Ok(motion) => motion.swept_volume(&arm.arm, &belief.grid),
         Err(_) => skill.swept_by_gripper(arm, belief),
     };
-    skill.intervention(belief, &FloorPlan::new(belief, SOLID), &arm.arm, swept)
+    skill.intervention(belief, &FloorPlan::new(belief, SOLID), swept)
 }
 
 /// Draws one feasible manipulation at random, each of the skills as likely as the other, with those that were rejected on

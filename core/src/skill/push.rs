@@ -110,7 +110,7 @@ impl Skill for Push {
         swept
     }
 
-    fn intervention(&self, belief: &Belief, solid: &FloorPlan, _arm: &Arm, swept: VoxelSet) -> Intervention {
+    fn intervention(&self, belief: &Belief, solid: &FloorPlan, swept: VoxelSet) -> Intervention {
         SweptPush { push: *self, swept }.intervention(belief, solid)
     }
 

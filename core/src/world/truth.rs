@@ -58,6 +58,24 @@ impl TruthMap {
         truth
     }
 
+    /// Per voxel, the object that has its centre inside, the later one where two overlap; [`u16::MAX`] where none has.
+    pub fn owners(grid: &Grid, bodies: &[Body]) -> Vec<u16> {
+        let parts = placed_parts(grid, bodies);
+        let [_, depth, height] = grid.dims;
+        let mut owners = vec![u16::MAX; grid.voxel_count()];
+        owners.par_chunks_mut(depth * height).enumerate().with_min_len(grid.dims[0].div_ceil(16)).for_each(
+            |(x, owners)| {
+                for part in parts.iter().filter(|part| part.x.contains(&x)) {
+                    for y in part.y.clone() {
+                        let levels = levels_inside(grid, x * depth + y, &part.faces);
+                        owners[y * height..(y + 1) * height][levels].fill(part.object);
+                    }
+                }
+            },
+        );
+        owners
+    }
+
     /// Adds a thin body if no voxel's centre is inside. Of the cells that it touches it names those where nothing
     /// is taller, or all where there is none of these.
     fn add_thin(&mut self, grid: &Grid, body: &Body) {

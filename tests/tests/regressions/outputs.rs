@@ -38,6 +38,14 @@ fn ends(mut child: Child) -> (ExitStatus, String) {
     (child.wait().expect("ended"), said)
 }
 
+/// Starts `nudge` where no file may grow beyond so many kilobytes (half of it where the shell counts in blocks of 512).
+fn with_small_files(kilobytes: u64, args: &[&str]) -> Child {
+    let script = format!("trap '' XFSZ; ulimit -f {kilobytes}; exec \"$@\"");
+    let mut shell = Command::new("bash");
+    shell.args(["-c", &script, "bash"]).arg(nudge_bin()).args(args);
+    shell.current_dir(root()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("starts")
+}
+
 /// What of standard error is no progress.
 fn complaints(said: &str) -> Vec<&str> {
     let complains = |line: &&str| ["nudge:", "warning:", "panicked", "error"].iter().any(|word| line.contains(word));
@@ -138,11 +146,7 @@ fn a_disk_that_filled_up_during_a_run_made_it_hang_for_ever() {
     for share in [0.15, 0.5, 0.97] {
         let out = folder.name(&format!("e{share}"));
         let limit = (share * whole as f64 / 1024.0) as u64;
-        let script = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$@\"");
-        let mut shell = Command::new("bash");
-        shell.args(["-c", &script, "bash"]).arg(nudge_bin()).args(run(&scene, &out));
-        let child = shell.current_dir(root()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("starts");
-        let (status, said) = ends(child);
+        let (status, said) = ends(with_small_files(limit, &run(&scene, &out)));
         assert_eq!(status.code(), Some(2), "{share}: {said}");
         let complaints = complaints(&said);
         assert!(complaints.len() == 1 && complaints[0].contains("episode.rrd: File too large"), "{share}: {said}");
@@ -162,6 +166,28 @@ fn a_disk_that_filled_up_during_a_run_made_it_hang_for_ever() {
             assert!(counted.status.success(), "{share}: {}", text(&counted.stderr));
         }
     }
+}
+
+#[test]
+fn a_disk_that_fills_up_ends_a_bench_and_making_data_with_one_line() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("set")).expect("folder");
+    folder.write("set/tin.toml", small_scene(TIN));
+    let (set, bench, data) = (folder.name("set"), folder.name("bench"), folder.name("data"));
+    let settings = ["--policies", "random", "--belief", "classical", "--seeds", "1", "--budget", "2", "--jobs", "1"];
+    let benching = [&["bench", &set, "--out", &bench], &settings[..]].concat();
+    let making = ["data", "maps", "--seed", "2", "--count", "1", "--noise", "0", "--out", &data];
+    for (args, file, kilobytes) in [(&benching[..], "random-0.json", 2), (&making[..], "shard-00000.zst", 4)] {
+        let (status, said) = ends(with_small_files(kilobytes, args));
+        let complaints = complaints(&said);
+        assert_eq!(status.code(), Some(2), "{said}");
+        assert!(complaints.len() == 1 && complaints[0].contains(&format!("{file}: File too large")), "{said}");
+    }
+    assert!(!folder.path("bench/episodes/set/tin/random-0.json").exists(), "half-written");
+    assert!(!folder.path("data/shard-00000.zst").exists() && !folder.path("data/shard-00000.json").exists());
+    // With room both go on.
+    nudge_ok(&benching);
+    nudge_ok(&making);
 }
 
 #[test]

@@ -21,7 +21,7 @@ fn notes_and_verdicts_survive_export_and_reopening() {
     window.click("Step 1");
     window.type_into(Role::MultilineTextInput, "Note on step 1", "the box hides the can");
     window.click("Step 2");
-    let object = window.session().record.steps[1].objects[0].clone();
+    let object = window.session().record.steps[1].objects()[0].clone();
     let name = nudge::verdicts::object_name(&object);
     let other = if object.verdict == Verdict::NotFound { "found" } else { "not found" };
     window.click(&format!("Verdict on {name}"));
@@ -60,7 +60,7 @@ fn tables_are_written_as_csv() {
         assert_eq!(text.lines().count(), rows + 1, "{name}");
     }
     let verdicts = std::fs::read_to_string(tables.join("verdicts.csv")).expect("a table");
-    let objects = window.session().record.steps.iter().map(|step| step.objects.len()).sum::<usize>();
+    let objects = window.session().record.steps.iter().map(|step| step.objects().len()).sum::<usize>();
     assert_eq!(verdicts.lines().count(), objects + 1);
 }
 

@@ -133,7 +133,7 @@ fn a_push_is_previewed_done_and_reviewed() {
     assert_eq!(window.session().record.steps[4].action, Action::Manipulate(decision.candidates[feasible].manipulation));
     // The arm can be moved along what it did.
     assert!(window.sees("The arm in step 5") && window.sees("approach"));
-    let scrubbed = |window: &Window| window.model().panels.motion_s((window.session().id, 5));
+    let scrubbed = |window: &Window| window.model().scrubbed.at_s((window.session().id, 5));
     assert_eq!(scrubbed(&window), None);
     let slider = "Time in the arm's motion";
     window.harness.get(by().role(Role::Slider).label(slider)).focus();

@@ -44,7 +44,7 @@ fn open_decide_do_and_run() {
     assert_eq!(window.steps(), 4);
     let session = window.session();
     assert!(session.is_finished() && session.activity == Activity::Idle);
-    assert!(session.moments[4].scores.entropy_nats < session.moments[0].scores.entropy_nats);
+    assert!(session.moments[4].entropy_nats < session.moments[0].entropy_nats);
     let written = window.path();
     assert!(written.join("episode.json").exists() && written.join("beliefs/004.npz").exists());
     // The window closes the episode's recording and draws its figure before it is gone.

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 /// Width of the column that names a decision.
 const NAME: usize = 34;
 
-/// The pushes of one decision, the one with the largest promise first, and what they tell together.
+/// The pushes of one decision, the planner's best first, and what they tell together.
 pub(super) fn pushes(probed: &Probed, step: &ProbedStep) -> String {
     let ProbedStep { probe, summary } = step;
     let hidden = match &probe.hidden[..] {
@@ -30,10 +30,7 @@ pub(super) fn pushes(probed: &Probed, step: &ProbedStep) -> String {
         "   {:<33} {:>12} {:>9}  {:>8} {:>4} {:>4}  {:>12} {:>7}",
         "push", "promise nats", "reg nats", "opens l", "won", "lost", "came mm", "moved m"
     );
-    let mut order: Vec<usize> = (0..probe.pushes.len()).collect();
-    let promise = |at: usize| probe.pushes[at].promised_gain.unwrap_or(f32::NEG_INFINITY);
-    order.sort_by(|&a, &b| promise(b).total_cmp(&promise(a)));
-    for at in order {
+    for at in probe.ranked() {
         let mark = match (probe.chosen == Some(at), probe.made == Some(at)) {
             (true, true) => "*!",
             (true, false) => "* ",
@@ -165,13 +162,13 @@ const COLUMNS: [&str; 26] = [
     "hidden_before",
 ];
 
-/// Every push as CSV (RFC 4180), one a line; of objects the names, with spaces between them.
+/// Every push as CSV (RFC 4180), one a line, of each decision the planner's best first; of objects the names, with spaces between them.
 pub(super) fn csv(episodes: &[Probed]) -> String {
     let mut text = COLUMNS.join(",") + "\r\n";
     for probed in episodes {
         for ProbedStep { probe, .. } in &probed.steps {
-            for (at, push) in probe.pushes.iter().enumerate() {
-                let fields = fields(probed, probe, at, push).map(|field| quoted(&field));
+            for at in probe.ranked() {
+                let fields = fields(probed, probe, at, &probe.pushes[at]).map(|field| quoted(&field));
                 text += &fields.join(",");
                 text += "\r\n";
             }

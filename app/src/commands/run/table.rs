@@ -3,7 +3,7 @@
 use super::Column;
 use crate::record::mishaps;
 use nudge_core::camera::NoiseModel;
-use nudge_core::episode::{EpisodeRecord, StepRecord};
+use nudge_core::episode::{EpisodeRecord, NO_TRUTH, StepRecord};
 use nudge_core::plan::{Action, Reason};
 use nudge_core::score::{Scores, Verdict};
 
@@ -23,28 +23,33 @@ pub(super) fn header(record: &EpisodeRecord) {
         "{:>6}  {:<34} {:>9}  {:>6}  {:>6}  {:>9}  {:>6}",
         "step", "action", "gain nats", "IoU", "mIoU", "H nats", "s"
     );
-    row("0", "prior", None, &record.prior, None);
+    row("0", "prior", None, (record.prior.scores.as_ref(), record.prior.entropy_nats), None);
+    if !record.has_truth() {
+        println!("        {NO_TRUTH}");
+    }
 }
 
 pub(super) fn step(step: &StepRecord, budget: usize) {
-    let gain = match step.action {
-        Action::Look { view } => step.decision.gains.get(usize::from(view.0)).copied(),
-        Action::Manipulate(_) => Some(step.decision.igm),
-    };
     let mut action = action_words(step);
     for mishap in mishaps(step) {
         action += &format!(", {mishap}");
     }
-    row(&format!("{}/{budget}", step.index), &action, gain, &step.scores, Some(step.seconds.total()));
+    row(
+        &format!("{}/{budget}", step.index),
+        &action,
+        step.decision.promised(),
+        (step.scores(), step.entropy_nats),
+        Some(step.seconds.total()),
+    );
 }
 
-fn row(step: &str, action: &str, gain: Option<f32>, scores: &Scores, seconds: Option<f64>) {
+fn row(step: &str, action: &str, gain: Option<f32>, state: (Option<&Scores>, f64), seconds: Option<f64>) {
+    let (scores, entropy_nats) = state;
+    let score = |of: fn(&Scores) -> f64| scores.map_or(String::new(), |scores| format!("{:.3}", of(scores)));
     let gain = gain.map_or(String::new(), |gain| format!("{gain:.1}"));
     let seconds = seconds.map_or(String::new(), |seconds| format!("{seconds:.2}"));
-    println!(
-        "{step:>6}  {action:<34} {gain:>9}  {:>6.3}  {:>6.3}  {:>9.0}  {seconds:>6}",
-        scores.occupancy_iou, scores.semantic_miou, scores.entropy_nats
-    );
+    let (iou, miou) = (score(|s| s.occupancy_iou), score(|s| s.semantic_miou));
+    println!("{step:>6}  {action:<34} {gain:>9}  {iou:>6}  {miou:>6}  {entropy_nats:>9.0}  {seconds:>6}");
 }
 
 /// `look 143`, `look 143 (after the push)`, `push 0.12 m at 75 deg`.
@@ -78,7 +83,9 @@ pub(super) fn summary(columns: &[Column]) {
         scored(column, |s| format!("{:.3} occupancy, {:.3} semantics", s.mece_occupancy, s.mece_semantics))
     });
     line("map entropy", columns, |column| {
-        scored(column, |s| format!("{:.0} nats of {:.0}", s.entropy_nats, column.record.prior.entropy_nats))
+        let record = &column.record;
+        let (first, last) = (record.prior.entropy_nats, record.entropy_after(record.steps.len()));
+        if record.steps.is_empty() { String::new() } else { format!("{last:.0} nats of {first:.0}") }
     });
     line("objects found", columns, |column| {
         format!("{} of {}", count(column, Verdict::Found), column.record.scene.objects.len())
@@ -88,8 +95,8 @@ pub(super) fn summary(columns: &[Column]) {
         format!("{}, {}", count(column, Verdict::Misclassified), count(column, Verdict::Hallucinated))
     });
     line("moved, dropped", columns, |column| {
-        let dropped: usize = column.record.steps.iter().map(|step| step.dropped.len()).sum();
-        format!("{:.2} m, {dropped}", total(column, |step| step.displacement_m))
+        let dropped: usize = column.record.steps.iter().map(|step| step.dropped().len()).sum();
+        format!("{:.2} m, {dropped}", total(column, |step| step.displacement_m().unwrap_or(0.0)))
     });
     line("the arm moved for", columns, |column| format!("{:.0} s", total(column, |step| step.motion_s)));
     line("time", columns, |column| format!("{:.1} s", column.seconds));
@@ -116,18 +123,18 @@ fn line(name: &str, columns: &[Column], value: impl Fn(&Column) -> String) {
 }
 
 fn scored(column: &Column, words: impl Fn(&Scores) -> String) -> String {
-    column.record.steps.last().map_or(String::new(), |last| words(&last.scores))
+    column.record.steps.last().and_then(StepRecord::scores).map_or(String::new(), words)
 }
 
 fn count(column: &Column, verdict: Verdict) -> usize {
     let last = column.record.steps.last();
-    last.map_or(0, |last| last.objects.iter().filter(|object| object.verdict == verdict).count())
+    last.map_or(0, |last| last.objects().iter().filter(|object| object.verdict == verdict).count())
 }
 
 /// How many of the objects that no view shows at the start were found in the end.
 fn hidden_found(column: &Column) -> usize {
     let Some(last) = column.record.steps.last() else { return 0 };
-    let found = |id: u16| last.objects.iter().any(|v| v.object == Some(id) && v.verdict == Verdict::Found);
+    let found = |id: u16| last.objects().iter().any(|v| v.object == Some(id) && v.verdict == Verdict::Found);
     column.hidden.iter().filter(|id| found(id.0)).count()
 }
 

@@ -4,7 +4,7 @@ use super::{unknown_class, with_absolute_meshes};
 use crate::commands::progress::Progress;
 use crate::commands::{print, to_json, warn};
 use nudge_core::camera::{ViewArray, hidden_objects};
-use nudge_core::scene::{Catalog, ClassId, GenerateConfig, Scene, Shelf, generate};
+use nudge_core::scene::{Catalog, ClassId, Family, GenerateConfig, Scene, Shelf, generate};
 use nudge_core::{Error, rng};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -19,12 +19,16 @@ pub struct Args {
     /// Number of scenes
     #[arg(long, default_value_t = 1)]
     count: usize,
-    /// Share of the floor that objects cover: 0.4, or a range that each scene draws from, 0.30-0.45
-    #[arg(long, default_value = "0.30-0.45", value_parser = parse_fill)]
-    fill: Fill,
-    /// Regularity: 0 places freely, 1 lines objects up behind each other
-    #[arg(long, default_value_t = 0.0)]
-    rho: f32,
+    /// What is placed before the rest is filled at random: mixed, crowded, walls, rows, rings, tall-first, halves, chambers
+    #[arg(long, default_value_t = Family::Mixed, value_name = "NAME")]
+    family: Family,
+    /// Share of the floor that objects cover: 0.4, or a range that each scene draws from [default: 0.30-0.45, or the
+    /// family's own]
+    #[arg(long, value_parser = parse_fill, value_name = "SHARE")]
+    fill: Option<Fill>,
+    /// Regularity: 0 places freely, 1 lines objects up behind each other [default: 0, or the family's own]
+    #[arg(long)]
+    rho: Option<f32>,
     /// Seed of every random choice
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -143,7 +147,9 @@ fn config(args: &Args, catalog: &Catalog) -> anyhow::Result<GenerateConfig> {
         [width, depth, height] => config.shelf = Shelf::new([width, depth, height]),
         _ => return Err(Error::Usage("--shelf wants three numbers: width,depth,height".into()).into()),
     }
-    Ok(GenerateConfig { fill: args.fill.0, rho: args.rho, classes, ..config })
+    let family = args.family;
+    let fill = args.fill.map_or(family.fill(), |fill| fill.0);
+    Ok(GenerateConfig { family, fill, rho: args.rho.unwrap_or(family.rho()), classes, ..config })
 }
 
 /// Draws scenes until one hides enough objects.
@@ -171,10 +177,13 @@ fn generate_one(
             None => format!("generated-{}-{at:03}", args.seed),
         };
         let (fill, target_fill) = (scene.fill(catalog)?, config.target_fill(seed));
-        scene.description = match hidden {
-            Some(hidden) => format!("generated: fill {fill:.2}, regularity {}, {hidden} hidden", config.rho),
-            None => format!("generated: fill {fill:.2}, regularity {}", config.rho),
+        let structure = match config.family {
+            Family::Mixed => String::new(),
+            family => format!("{}; ", family.description()),
         };
+        let hidden_words = hidden.map_or(String::new(), |hidden| format!(", {hidden} hidden"));
+        let regularity = config.rho;
+        scene.description = format!("generated: {structure}fill {fill:.2}, regularity {regularity}{hidden_words}");
         let document = Generated {
             file: file.display().to_string(),
             name: scene.name.clone(),

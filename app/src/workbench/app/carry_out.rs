@@ -10,7 +10,7 @@ use crate::workbench::worker::{Begin, Order, Worker};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::gain::RayDensity;
-use nudge_core::plan::{Action, Decision, PolicyKind, Reason, gain_field, gain_sources};
+use nudge_core::plan::{Action, Decision, Gain, PolicyKind, Reason};
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
 use nudge_core::skill::{Manipulation, intended};
@@ -339,18 +339,7 @@ impl App {
         let weighed = self.model.session().and_then(|session| session.pending.clone());
         let decision = match weighed {
             Some(weighed) => Decision { action, reason: Reason::Manual, ..(*weighed).clone() },
-            None => Decision {
-                action,
-                reason: Reason::Manual,
-                igv: 0.0,
-                igm: 0.0,
-                reg: 0.0,
-                pair: Vec::new(),
-                gains: Vec::new(),
-                candidates: Vec::new(),
-                best_push: None,
-                motion: None,
-            },
+            None => Decision::unweighed(action, Reason::Manual),
         };
         self.carry_out(Command::Act(Arc::new(decision)));
     }
@@ -403,10 +392,11 @@ impl App {
         let Some(session) = self.model.session() else { return };
         let moment = session.moment(self.model.cursor).clone();
         let (of, views) = ((session.id, moment.step), session.setup.views.clone());
+        let counted = session.record.config.planner.counted;
         self.asked_gain = Some((of, view));
         self.background.gain.ask(move |_| {
-            let field = gain_field(&moment.belief.belief(), moment.seen.as_deref());
-            let nats = gain_sources(&field, &views, view, RayDensity::FULL);
+            let gain = Gain::new(counted, &moment.belief.belief(), &moment.seen);
+            let nats = gain.per_voxel(&views, view, RayDensity::FULL);
             Some(GainSource::new(of, view, nats))
         });
     }
@@ -414,7 +404,7 @@ impl App {
     /// Asks again where the chosen view's gain comes from, once the cursor has moved.
     pub(super) fn follow_gain(&mut self) {
         let at = self.model.session().map(|session| (session.id, self.model.cursor.min(session.steps())));
-        if let (LayoutKind::Gains, Some(of), Some(view)) = (self.model.kept.layout, at, self.model.view)
+        if let (true, Some(of), Some(view)) = (self.model.kept.layout.shows_gain(), at, self.model.view)
             && self.asked_gain != Some((of, view))
         {
             self.gain_of(view);

@@ -1,11 +1,12 @@
 //! The window's frame: menus and tabs on top, the episode at the left, the clock at the bottom, and the layout's panels
 //! around the three-dimensional views.
 
-use super::{App, Part};
+use super::App;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
-use crate::workbench::panels;
+use crate::workbench::panels::{self, Panel};
+use crate::workbench::part::Part;
 use re_viewer::external::re_ui::RecordingCommandKind;
 use re_viewer::external::{eframe, egui};
 use std::time::Instant;
@@ -149,23 +150,18 @@ impl App {
 
     fn layout(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>, ask: &mut Vec<Command>) {
         let layout = self.model.kept.layout;
-        let right = match layout {
-            LayoutKind::Gains => 460.0,
-            LayoutKind::Why | LayoutKind::Push | LayoutKind::Compare => 420.0,
-            _ => 330.0,
-        };
         let right = egui::Panel::right(egui::Id::new(("right", layout)))
-            .default_size(right)
+            .default_size(layout.right_width())
             .size_range(240.0..=700.0)
             .show(ui, |ui| {
                 ui.add_space(4.0);
                 match layout {
                     LayoutKind::Why => panels::why::show(ui, &mut self.model, ask),
-                    LayoutKind::Gains => panels::gains::show(ui, &mut self.model, ask),
-                    LayoutKind::Push => panels::push::show(ui, &mut self.model, ask),
-                    LayoutKind::Compare => panels::compare::show(ui, &mut self.model, ask),
+                    LayoutKind::Gains => self.panels.gains.show(ui, &mut self.model, ask),
+                    LayoutKind::Push => self.panels.push.show(ui, &mut self.model, ask),
+                    LayoutKind::Compare => self.panels.compare.show(ui, &mut self.model, ask),
                     LayoutKind::Episode | LayoutKind::Author => scrolled(ui, "right", |ui| {
-                        panels::decision::show(ui, &mut self.model, ask);
+                        self.panels.decision.show(ui, &mut self.model, ask);
                         ui.add_space(8.0);
                         ui.separator();
                         panels::notes::show(ui, &mut self.model, ask);
@@ -186,9 +182,9 @@ impl App {
         if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {
             let maps = egui::Panel::right("maps").default_size(340.0).size_range(220.0..=800.0).show(ui, |ui| {
                 scrolled(ui, "maps", |ui| {
-                    panels::maps::show(ui, &mut self.model, ask);
+                    self.panels.maps.show(ui, &mut self.model, ask);
                     ui.add_space(6.0);
-                    panels::camera::show(ui, &mut self.model, ask);
+                    self.panels.camera.show(ui, &mut self.model, ask);
                 });
             });
             self.parts.push((Part::Maps, maps.response.rect));

@@ -1,12 +1,13 @@
 //! What is read and written: scenes, episodes and recordings that are opened, notes and scenes that are saved, exports.
 
-use super::{App, ChosenFor, Opening, Part};
+use super::{App, ChosenFor, Opening};
 use crate::workbench::annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::Dialog;
 use crate::workbench::export;
 use crate::workbench::file_kind::FileKind;
 use crate::workbench::model::LayoutKind;
+use crate::workbench::part::Part;
 use crate::workbench::recording_file::{self, Ending};
 use crate::workbench::session::{Session, SessionId};
 use crate::workbench::threads;

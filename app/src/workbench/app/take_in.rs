@@ -1,11 +1,12 @@
 //! What comes in every frame: events of workers, answers of jobs, clicks in the viewer, keys, dropped files.
 
-use super::{App, ChosenFor, Part};
+use super::{App, ChosenFor};
 use crate::workbench::annotations::Annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::derive::Derived;
 use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, Picked};
+use crate::workbench::part::Part;
 use crate::workbench::session::{Activity, Session, SessionId};
 use crate::workbench::space::{Side, Space};
 use crate::workbench::viewer::{Clicked, Viewer};
@@ -301,7 +302,7 @@ impl App {
         let side = |session: &Session| Side::of(session, model.cursor);
         let kept = &model.kept;
         let motion_s =
-            model.session().and_then(|session| model.panels.motion_s((session.id, model.cursor.min(session.steps()))));
+            model.session().and_then(|session| model.scrubbed.at_s((session.id, model.cursor.min(session.steps()))));
         let key = format!(
             "{motion_s:?} {:?} {aspect:.2} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             kept.layout,

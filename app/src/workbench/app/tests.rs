@@ -1,9 +1,10 @@
 //! What only happens when something breaks, driven through the window. The rest is tested from outside, in `tests/`.
 
-use super::{App, FormOptions, Options, Part};
+use super::{App, FormOptions, Options};
 use crate::workbench::command::Command;
 use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, StartForm};
+use crate::workbench::part::Part;
 use crate::workbench::session::Activity;
 use crate::workbench::worker::Order;
 use egui_kittest::Harness;
@@ -142,7 +143,7 @@ fn an_episode_of_another_version_is_shown_as_it_is_filed() {
     let reason = session.read_only.as_deref().expect("read only");
     assert!(reason.contains("step 1: scores.semantic_miou: 0.125 in the log"), "{reason}");
     assert_eq!((session.path.clone(), session.steps()), (path, 2));
-    assert_eq!(session.moments[1].scores.semantic_miou, 0.125);
+    assert_eq!(session.moments[1].scores.expect("a truth").semantic_miou, 0.125);
 }
 
 #[test]

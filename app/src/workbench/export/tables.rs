@@ -5,6 +5,7 @@ use crate::verdicts::verdict_title;
 use nudge_core::episode::StepOutcome;
 use nudge_core::files::write_atomically;
 use nudge_core::plan::Action;
+use nudge_core::score::Scores;
 use nudge_core::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -61,19 +62,19 @@ pub fn scores_csv(session: &Session) -> String {
     ]);
     for moment in &session.moments {
         let record = moment.outcome.as_ref().map(|outcome| &outcome.record);
-        let scores = &moment.scores;
         let of_step = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
+        let score = |of: fn(&Scores) -> f64| of_step(moment.scores.as_ref().map(of));
         let mut row = vec![
             moment.step.to_string(),
             record.map_or("prior", |record| kind(&record.action)).to_owned(),
-            scores.occupancy_iou.to_string(),
-            scores.occupied_iou.to_string(),
-            scores.semantic_miou.to_string(),
-            scores.entropy_nats.to_string(),
-            scores.mece_occupancy.to_string(),
-            scores.mece_semantics.to_string(),
-            of_step(record.map(|record| record.displacement_m)),
-            record.map_or(String::new(), |record| record.dropped.join(" ")),
+            score(|s| s.occupancy_iou),
+            score(|s| s.occupied_iou),
+            score(|s| s.semantic_miou),
+            moment.entropy_nats.to_string(),
+            score(|s| s.mece_occupancy),
+            score(|s| s.mece_semantics),
+            of_step(record.and_then(|record| record.displacement_m())),
+            record.map_or(String::new(), |record| record.dropped().join(" ")),
         ];
         let seconds = record.map(|record| record.seconds);
         row.extend([
@@ -152,7 +153,7 @@ pub fn decisions_csv(session: &Session) -> String {
 pub fn verdicts_csv(session: &Session) -> String {
     let mut table = Table::new(&["step", "object", "class", "x_m", "y_m", "scorer_says", "verdict", "overruled"]);
     for (moment, outcome) in steps(session) {
-        for judged in session.annotations.judge(moment.step, &outcome.record.objects) {
+        for judged in session.annotations.judge(moment.step, outcome.record.objects()) {
             let [x, y] = judged.proposed.position;
             table.row([
                 moment.step.to_string(),

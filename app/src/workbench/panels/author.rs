@@ -2,16 +2,17 @@
 //! right.
 
 mod canvas;
+mod common;
 mod palette;
 mod properties;
 #[cfg(test)]
 mod tests;
 mod toolbar;
 
-use crate::workbench::author::{Author, Choose};
+use crate::workbench::author::Author;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::model::Model;
-use nudge_core::scene::ClassId;
+use common::{DELETE, DUPLICATE, REDO, ROTATE, ROTATE_BACK, SAVE, SELECT_ALL, UNDO};
 use re_viewer::external::egui::{self, Key, KeyboardShortcut, Modifiers};
 use std::sync::Arc;
 
@@ -51,28 +52,6 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
         }
     }
 }
-
-/// A class that is carried from the palette, and whether it was let go in this frame.
-#[derive(Clone, Copy)]
-struct Carried {
-    class: ClassId,
-    at: egui::Pos2,
-    is_let_go: bool,
-}
-
-/// A shortcut with the command key.
-const fn command(key: Key) -> KeyboardShortcut {
-    KeyboardShortcut::new(Modifiers::COMMAND, key)
-}
-
-const SAVE: KeyboardShortcut = command(Key::S);
-const DUPLICATE: KeyboardShortcut = command(Key::D);
-const UNDO: KeyboardShortcut = command(Key::Z);
-const REDO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND.plus(Modifiers::SHIFT), Key::Z);
-const SELECT_ALL: KeyboardShortcut = command(Key::A);
-const ROTATE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::R);
-const ROTATE_BACK: KeyboardShortcut = KeyboardShortcut::new(Modifiers::SHIFT, Key::R);
-const DELETE: KeyboardShortcut = KeyboardShortcut::new(Modifiers::NONE, Key::Delete);
 
 /// What the keyboard asks for wherever the focus is.
 fn keys(ui: &egui::Ui, author: &mut Author, ask: &mut Vec<Command>) {
@@ -131,20 +110,4 @@ fn keys_on_board(ui: &egui::Ui, author: &mut Author) {
             author.settle();
         }
     }
-}
-
-/// How a click chooses: with shift or the command key, beside what is chosen.
-fn choice(modifiers: Modifiers) -> Choose {
-    if modifiers.shift || modifiers.command { Choose::Toggle } else { Choose::Only }
-}
-
-/// Gives a widget the name that it is told by.
-fn named(response: egui::Response, name: &str) -> egui::Response {
-    response.ctx.accesskit_node_builder(response.id, |node| node.set_label(name));
-    response
-}
-
-/// A colour of the catalogue.
-fn colour([red, green, blue]: [u8; 3]) -> egui::Color32 {
-    egui::Color32::from_rgb(red, green, blue)
 }

@@ -2,12 +2,13 @@
 
 use super::legend::{self, Bar};
 use super::textures::Textures;
-use super::{NO_EPISODE, empty, heading};
+use super::{NO_EPISODE, Panel, empty, heading};
 use crate::colors::{self, Rgb};
 use crate::workbench::command::Command;
 use crate::workbench::model::Model;
 use crate::workbench::session::{Session, SessionId};
-use nudge_core::camera::{Image, UNOBSERVED};
+use nudge_core::camera::{Frame, UNLABELLED};
+use nudge_core::plan::Action;
 use nudge_core::scene::{CLASS_COUNT, ClassId};
 use re_viewer::external::egui::{
     self, Color32, ColorImage, Pos2, Rect, Sense, Stroke, StrokeKind, TextureFilter, TextureHandle, TextureOptions,
@@ -34,62 +35,69 @@ pub struct State {
     seen: Option<(SessionId, usize, Vec<ClassId>)>,
 }
 
-/// Draws both images, side by side where there is room.
-pub fn show(ui: &mut Ui, model: &mut Model, _ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.camera);
-    draw(&mut state, ui, model);
-    model.panels.camera = state;
+impl Panel for State {
+    /// Draws both images, side by side where there is room.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, _ask: &mut Vec<Command>) {
+        draw(self, ui, model);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model) {
     let Some(session) = model.session() else { return empty(ui, NO_EPISODE) };
     let until = model.cursor.min(session.steps());
     let mut moments = session.moments[..=until].iter().rev();
-    let found = moments.find_map(|moment| Some((moment.step, moment.outcome.as_ref()?.image.as_ref()?)));
-    let Some((step, image)) = found else {
+    let found = moments.find_map(|moment| {
+        let outcome = moment.outcome.as_ref()?;
+        Some((moment.step, outcome.record.action, outcome.frame.as_ref()?))
+    });
+    let Some((step, action, frame)) = found else {
         return empty(ui, "No image yet: decide, or choose a view to look from");
     };
     let when =
         if step == until { format!("step {step}") } else { format!("step {step}, the last look before {until}") };
     heading(
         ui,
-        format!("Camera: view {} at {when}", image.view.0),
+        match action {
+            Action::Look { view } => format!("Camera: view {} at {when}", view.0),
+            _ => format!("Camera at {when}"),
+        },
         "What the robot's camera saw; the belief was updated with it",
     );
     let gap = 10.0;
     let columns = if ui.available_width() < 300.0 { 1 } else { 2 };
     let width = ((ui.available_width() - gap * (columns - 1) as f32) / columns as f32).floor().max(40.0);
-    let range = session.setup.views.intrinsics.depth_range_m;
+    let range = frame.intrinsics().depth_range_m;
     for shown in [Shown::Depth, Shown::Labels].chunks(columns) {
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = gap;
             for &shown in shown {
                 ui.vertical(|ui| {
                     ui.set_width(width);
-                    one(state, ui, session, step, image, shown, range);
+                    one(state, ui, session, step, frame, shown, range);
                 });
             }
         });
     }
 }
 
-fn one(state: &mut State, ui: &mut Ui, session: &Session, step: usize, image: &Image, shown: Shown, range: [f32; 2]) {
+fn one(state: &mut State, ui: &mut Ui, session: &Session, step: usize, frame: &Frame, shown: Shown, range: [f32; 2]) {
+    let labels = frame.labels();
     let options = match shown {
         Shown::Depth => TextureOptions::LINEAR,
         Shown::Labels => TextureOptions { magnification: TextureFilter::Nearest, ..TextureOptions::LINEAR },
     };
     let picture = state.textures.get_with(ui.ctx(), (session.id, step, shown), options, || match shown {
-        Shown::Depth => paint(image, |at| depth_rgb(image.depth_m[at], range)),
-        Shown::Labels => paint(image, |at| label_rgb(session, image.labels[at])),
+        Shown::Depth => paint(frame, |at| depth_rgb(frame.depth_m()[at], range)),
+        Shown::Labels => paint(frame, |at| label_rgb(session, labels[at])),
     });
     let name = match shown {
         Shown::Depth => "Depth image",
         Shown::Labels => "Label image",
     };
-    image_widget(ui, &picture, image.size, name, |at| match shown {
-        Shown::Depth if image.depth_m[at] > 0.0 => format!("{:.3} m", image.depth_m[at]),
+    image_widget(ui, &picture, frame.size(), name, |at| match shown {
+        Shown::Depth if frame.depth_m()[at] > 0.0 => format!("{:.3} m", frame.depth_m()[at]),
         Shown::Depth => "no reading".to_owned(),
-        Shown::Labels => label_name(session, image.labels[at]),
+        Shown::Labels => label_name(session, labels[at]),
     });
     match shown {
         Shown::Depth => {
@@ -102,7 +110,7 @@ fn one(state: &mut State, ui: &mut Ui, session: &Session, step: usize, image: &I
         Shown::Labels => {
             let known = state.seen.as_ref().is_some_and(|seen| (seen.0, seen.1) == (session.id, step));
             if !known {
-                let labels: BTreeSet<u8> = image.labels.iter().copied().filter(|label| *label != UNOBSERVED).collect();
+                let labels: BTreeSet<u8> = labels.iter().copied().filter(|label| *label != UNLABELLED).collect();
                 state.seen = Some((session.id, step, labels.into_iter().map(ClassId).collect()));
             }
             let catalog = &session.setup.catalog;
@@ -140,8 +148,8 @@ fn image_widget(
 }
 
 /// Paints an image pixel by pixel, coarser where it is larger than is sensible.
-fn paint(image: &Image, rgb: impl Fn(usize) -> Rgb) -> ColorImage {
-    let [columns, rows] = image.size;
+fn paint(frame: &Frame, rgb: impl Fn(usize) -> Rgb) -> ColorImage {
+    let [columns, rows] = frame.size();
     let every = columns.max(rows).div_ceil(LARGEST_PX).max(1);
     let size = [columns.div_ceil(every), rows.div_ceil(every)];
     let pixels = (0..size[1]).flat_map(|row| (0..size[0]).map(move |column| (row * columns + column) * every));

@@ -69,8 +69,8 @@ impl Subject<'_> {
         if causes.is_empty() && (from_to[1] - from_to[0]).abs() > CHANGED {
             causes.push(self.unseen(outcome));
         }
-        let labels = [before, after].map(|moment| moment.truth.labels.get(self.cell).copied());
-        if let [before, Some(label)] = labels
+        let label = |moment: &Moment| moment.truth.as_ref()?.labels.get(self.cell).copied();
+        if let (before, Some(label)) = (label(before), label(after))
             && before != Some(label)
         {
             causes.push(format!("what stands there became {}", self.class(label)));
@@ -109,7 +109,7 @@ impl Subject<'_> {
     /// What a push did to it.
     fn pushed(&self, outcome: &StepOutcome) -> Vec<String> {
         let mut causes = Vec::new();
-        if let Some(push) = &outcome.intervention {
+        if let Some(push) = &outcome.swept {
             let swept = match self.voxel {
                 Some(voxel) => push.swept.contains(voxel),
                 None => self.grid.column(self.cell).any(|voxel| push.swept.contains(voxel)),

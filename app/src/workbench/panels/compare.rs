@@ -3,7 +3,7 @@
 use super::floor::{FloorMap, Line, Outlines};
 use super::legend::{self, Bar};
 use super::textures::{self, Textures};
-use super::{NO_EPISODE, empty, heading, maps, words};
+use super::{NO_EPISODE, Panel, empty, heading, maps, words};
 use crate::colors::{self, Colormap};
 use crate::picture::{self, FloorPlan};
 use crate::record::decision::SERIES;
@@ -51,11 +51,11 @@ pub fn first_difference(a: &Session, b: &Session) -> Option<usize> {
     pairs.position(|(a, b)| a.action != b.action).map(|at| at + 1)
 }
 
-/// Draws the comparison.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.compare);
-    draw(&mut state, ui, model, ask);
-    model.panels.compare = state;
+impl Panel for State {
+    /// Draws the comparison.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        draw(self, ui, model, ask);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) {
@@ -152,7 +152,7 @@ fn parting(ui: &mut Ui, model: &Model, a: &Session, b: &Session, ask: &mut Vec<C
 }
 
 fn scores(ui: &mut Ui, model: &Model, a: &Session, b: &Session) {
-    let [a, b] = [a, b].map(|session| session.moment(model.cursor).scores);
+    let [a, b] = [a, b].map(|session| session.moment(model.cursor));
     heading(ui, format!("Scores after step {}", model.cursor), "Of the states that are shown");
     egui::Grid::new("compare scores").num_columns(4).striped(true).spacing([16.0, 3.0]).show(ui, |ui| {
         for title in ["", "A", "B", "A − B"] {
@@ -160,10 +160,14 @@ fn scores(ui: &mut Ui, model: &Model, a: &Session, b: &Session) {
         }
         ui.end_row();
         for series in SERIES {
-            let (a, b) = ((series.value)(&a), (series.value)(&b));
+            let (a, b) = (a.score(series), b.score(series));
+            if a.is_none() && b.is_none() {
+                continue;
+            }
+            let between = a.zip(b).map(|(a, b)| a - b);
             ui.label(RichText::new(series.title).small()).on_hover_text(series.hint);
-            for value in [a, b, a - b] {
-                ui.label(words::figure(words::significant(value, 3)));
+            for value in [a, b, between] {
+                ui.label(words::figure(value.map_or_else(String::new, |value| words::significant(value, 3))));
             }
             ui.end_row();
         }

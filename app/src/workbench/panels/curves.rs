@@ -68,7 +68,7 @@ impl Curves<'_> {
         let sessions = std::iter::once(self.session).chain(self.other);
         let largest = sessions
             .flat_map(|session| &session.moments)
-            .map(|moment| moment.scores.entropy_nats)
+            .map(|moment| moment.entropy_nats)
             .filter(|nats| nats.is_finite())
             .fold(0.0, f64::max);
         [0.0, if largest > 0.0 { 1.08 * largest } else { 1.0 }]
@@ -150,7 +150,8 @@ impl Curves<'_> {
     /// What the lines are, with their values at the cursor.
     fn legend(&self, ui: &mut Ui, series: &[&Series]) {
         let at = |session: &Session, series: &Series| {
-            words::significant((series.value)(&session.moment(self.cursor).scores), 3)
+            let value = session.moment(self.cursor).score(series);
+            value.map_or_else(|| "n/a".to_owned(), |value| words::significant(value, 3))
         };
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing = vec2(5.0, 1.0);
@@ -182,7 +183,7 @@ impl Curves<'_> {
                 let values: Vec<[f64; 2]> = session
                     .moments
                     .iter()
-                    .map(|moment| [moment.step as f64, (series.value)(&moment.scores)])
+                    .filter_map(|moment| Some([moment.step as f64, moment.score(series)?]))
                     .filter(|point| point[1].is_finite())
                     .collect();
                 let name = match (self.other, style) {

@@ -2,14 +2,13 @@
 
 use super::table::{self, Sort};
 use super::weighed::{self, Listed};
-use super::{NO_EPISODE, Touched, empty, heading, spark, words};
+use super::{NO_EPISODE, Panel, Touched, empty, heading, spark, words};
 use crate::colors::Colormap;
 use crate::workbench::command::Command;
 use crate::workbench::model::{Hovered, Model};
 use crate::workbench::session::{Activity, Session};
 use nudge_core::camera::ViewId;
-use nudge_core::episode::EpisodeConfig;
-use nudge_core::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason};
+use nudge_core::plan::{Action, Comparison, DISTURBANCE, Decision, TermKind};
 use re_viewer::external::egui::{self, Button, RichText, Ui};
 
 /// What the panel remembers.
@@ -23,16 +22,16 @@ pub struct State {
 
 impl Default for State {
     fn default() -> Self {
-        Self { views: Sort::falling(1), pushes: Sort::falling(1), rejected: false, hovering: false }
+        Self { views: Sort::falling(1), pushes: Sort::as_given(), rejected: false, hovering: false }
     }
 }
 
-/// Draws the decision.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.decision);
-    let touched = draw(&mut state, ui, model, ask);
-    touched.apply(model, &mut state.hovering);
-    model.panels.decision = state;
+impl Panel for State {
+    /// Draws the decision.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        let touched = draw(self, ui, model, ask);
+        touched.apply(model, &mut self.hovering);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
@@ -47,7 +46,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
     };
     ui.spacing_mut().item_spacing.y = 4.0;
     header(ui, session, model.cursor);
-    verdict(ui, decision, &session.record.config);
+    verdict(ui, &decision.comparison(), &decision.action);
     ui.add_space(4.0);
     views(state, ui, model, session, decision, &mut touched, ask);
     ui.add_space(4.0);
@@ -86,111 +85,40 @@ fn header(ui: &mut Ui, session: &Session, cursor: usize) {
     });
 }
 
-/// A bar of the comparison: its name, its value in nats, its shade, whether it decided, and what it is.
-struct Compared {
-    name: &'static str,
-    nats: f32,
-    shade: f32,
-    strong: bool,
-    hint: String,
-}
-
-/// What was compared, in the order of the bars: looking, the threshold where a push has to reach another one, and the best
-/// push with what it disturbs.
-fn compared(decision: &Decision, planner: &PlannerSettings) -> Vec<Compared> {
-    let (counted, look) = (planner.counted, decision.igv);
-    let looks = matches!(decision.action, Action::Look { .. });
-    let ruled = matches!(decision.reason, Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore);
-    let mut bars = vec![Compared {
-        name: "Look (IGV)",
-        nats: look,
-        shade: 0.85,
-        strong: ruled && looks,
-        hint: format!("IGV, nats: {}", counted.of_looks()),
-    }];
-    if !weighs_pushes(decision) {
-        return bars;
-    }
-    let needed = planner.asked_of_pushes(look);
-    if needed != look {
-        let hint = if needed > planner.patience * look {
-            format!(
-                "Threshold: a push has to be worth {} at least, whatever looking gains",
-                words::nats(planner.push_floor)
-            )
-        } else {
-            format!("Threshold: a push has to be worth {} times what looking gains (patience)", planner.patience)
-        };
-        bars.push(Compared { name: "Threshold", nats: needed, shade: 0.7, strong: ruled && looks, hint });
-    }
-    let hint = format!("IGM, nats: {}", counted.of_pushes());
-    bars.push(Compared { name: "Push (IGM)", nats: decision.igm, shade: 0.5, strong: ruled && !looks, hint });
-    let hint = weighed::DISTURBANCE.to_owned();
-    bars.push(Compared { name: "Push: γ·Reg", nats: planner.gamma * decision.reg, shade: 0.1, strong: false, hint });
-    bars
-}
-
-/// Whether the best push was compared with looking.
-fn weighs_pushes(decision: &Decision) -> bool {
-    decision.best_push.is_some() && decision.igm != 0.0
-}
-
 /// Looking against pushing, as bars on one scale, and what follows.
-fn verdict(ui: &mut Ui, decision: &Decision, config: &EpisodeConfig) {
-    let planner = &config.planner;
-    let bars = compared(decision, planner);
-    let scale = bars.iter().map(|bar| bar.nats.abs()).filter(|nats| nats.is_finite()).fold(1e-6, f32::max);
-    for Compared { name, nats, shade, strong, hint } in bars {
+fn verdict(ui: &mut Ui, comparison: &Comparison, action: &Action) {
+    let nats = comparison.terms.iter().map(|term| term.nats.abs());
+    let scale = nats.filter(|nats| nats.is_finite()).fold(1e-6, f32::max);
+    for term in &comparison.terms {
+        let (name, shade) = match term.kind {
+            TermKind::Look => ("Look (IGV)", 0.85),
+            TermKind::Threshold => ("Threshold", 0.7),
+            TermKind::Push => ("Push (IGM)", 0.5),
+            TermKind::Disturbance => ("Push: γ·Reg", 0.1),
+        };
         let bar = spark::Bar {
             name: name.to_owned(),
-            share: nats.abs() / scale,
-            value: words::nats(nats),
+            share: term.nats.abs() / scale,
+            value: words::nats(term.nats),
             colour: super::legend::ink(Colormap::Cividis.rgb(shade)),
-            strong,
+            strong: term.decides,
+        };
+        let hint = match term.kind {
+            TermKind::Disturbance => DISTURBANCE.to_owned(),
+            _ => format!("{name}, nats: {}", term.words),
         };
         spark::bar(ui, &bar, 82.0, 72.0).on_hover_text(hint);
     }
-    if weighs_pushes(decision) {
-        let needed = planner.asked_of_pushes(decision.igv);
-        let name = if needed == decision.igv { "IGV" } else { "Threshold" };
-        let margin = needed - (decision.igm + planner.gamma * decision.reg);
+    if let Some(margin) = comparison.margin() {
+        let name = comparison.term(TermKind::Threshold).map_or("IGV", |_| "Threshold");
         let text = format!("{name} − (IGM + γ·Reg) = {}", words::nats(margin));
         ui.label(RichText::new(text).small()).on_hover_text("The policy looks if this is above 0, and else pushes");
     } else {
         ui.label(RichText::new("No push was weighed").small().weak());
     }
     ui.add_space(2.0);
-    let what = words::capital(&words::action(&decision.action));
-    ui.label(RichText::new(what).strong().heading().size(15.0));
-    ui.label(format!("because {}", because(decision.reason, config.policy, planner)));
-}
-
-/// A reason as the end of a sentence.
-fn because(reason: Reason, policy: PolicyKind, planner: &PlannerSettings) -> String {
-    let steps = |which: &str, count: usize| match count {
-        1 => format!("nothing is pushed in the {which} step"),
-        count => format!("nothing is pushed in the {which} {count} steps"),
-    };
-    match reason {
-        Reason::LookTellsMore
-        | Reason::PushTellsLittle
-        | Reason::PushTellsMore
-        | Reason::PushReveals
-        | Reason::MapComplete => words::reason(reason).to_owned(),
-        Reason::ViewOfPush => "it is the view that made the push worth it".to_owned(),
-        Reason::TooEarly => steps("first", planner.quiet_steps),
-        Reason::LastStep => steps("last", planner.closing_steps),
-        Reason::JustPushed
-            if matches!(policy, PolicyKind::Mem | PolicyKind::ClairvoyantPush) && planner.closing_steps > 1 =>
-        {
-            format!("{} looks follow a push before the next one", planner.closing_steps)
-        }
-        Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
-        Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),
-        Reason::NoCandidate => "no push is feasible".to_owned(),
-        Reason::Schedule => "the policy's schedule says so".to_owned(),
-        Reason::Manual => "it was chosen by hand".to_owned(),
-    }
+    ui.label(RichText::new(words::capital(&words::action(action))).strong().heading().size(15.0));
+    ui.label(format!("because {}", comparison.because));
 }
 
 fn views(
@@ -208,7 +136,7 @@ fn views(
     } else {
         let used = weighed::used_views(&session.record, model.cursor);
         let rows = weighed::view_rows(decision, &session.setup.views, &used, model.view);
-        let columns = weighed::view_columns(session.record.config.planner.counted);
+        let columns = weighed::view_columns(decision.counted());
         let table = table::show(ui, "views", &columns, rows, &mut state.views, 220.0);
         if let Some(view) = table.over {
             touched.over = Some(Hovered::View(ViewId(view as u16)));
@@ -240,7 +168,7 @@ fn pushes(
     if decision.candidates.is_empty() {
         return;
     }
-    let table = push_table(ui, &mut state.pushes, &mut state.rejected, model, session, decision, 220.0);
+    let table = push_table(ui, &mut state.pushes, &mut state.rejected, model, decision, 220.0);
     apply_push(table, decision, touched, ask);
     push_button(ui, session, model, decision, ask);
 }
@@ -251,7 +179,6 @@ pub fn push_table(
     sort: &mut Sort,
     rejected: &mut bool,
     model: &Model,
-    session: &Session,
     decision: &Decision,
     height: f32,
 ) -> table::Touched {
@@ -260,17 +187,20 @@ pub fn push_table(
         decision.candidates.iter().filter(|candidate| candidate.rejection.is_some()).count(),
     );
     ui.horizontal(|ui| {
-        heading(ui, "Best pushes", "The ten feasible pushes with the largest value, gain + γ·Reg");
+        heading(
+            ui,
+            "Best pushes",
+            "The ten feasible pushes that the planner ranks first: the best, then the others by gain",
+        );
         ui.label(RichText::new(format!("{} of {all} drawn are feasible", all - refused)).small().weak());
     });
-    let gamma = session.record.config.planner.gamma;
     let listed = if *rejected { Listed::All } else { Listed::Best };
-    let rows = weighed::push_rows(decision, gamma, listed, model.candidate);
+    let rows = weighed::push_rows(decision, listed, model.candidate);
     let touched = if rows.is_empty() {
         ui.weak("No push is feasible here");
         table::Touched::default()
     } else {
-        let columns = weighed::push_columns(decision, session.record.config.planner.counted);
+        let columns = weighed::push_columns(decision);
         table::show(ui, "pushes", &columns, rows, sort, height)
     };
     if refused > 0 {
@@ -296,7 +226,7 @@ pub(super) fn apply_push(table: table::Touched, decision: &Decision, touched: &m
 pub fn push_button(ui: &mut Ui, session: &Session, model: &Model, decision: &Decision, ask: &mut Vec<Command>) {
     let chosen = model.candidate.and_then(|at| Some((at, decision.candidates.get(at)?)));
     let title = chosen.map_or("Push this".to_owned(), |(at, _)| format!("Push this: {at}"));
-    let dropped = session.record.steps.iter().any(|step| !step.dropped.is_empty());
+    let dropped = session.record.steps.iter().any(|step| !step.dropped().is_empty());
     let missing = match chosen {
         _ if dropped => Some("An object was dropped: this episode pushes no more"),
         None => Some("Choose a push first"),
@@ -327,34 +257,4 @@ fn do_instead(ui: &mut Ui, session: &Session, cursor: usize, name: &str, title: 
     button.widget_info(|| egui::WidgetInfo::labeled(egui::WidgetType::Button, hindrance.is_none(), name));
     let button = button.on_hover_text("Does this in place of what the policy would do");
     button.on_disabled_hover_text(hindrance.unwrap_or_default()).clicked()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Only `mem` waits for all the looks that close a push; schedules keep to one.
-    #[test]
-    fn after_a_push_the_reason_says_what_the_policy_does() {
-        let planner = PlannerSettings { closing_steps: 4, ..PlannerSettings::default() };
-        let said = |policy| because(Reason::JustPushed, policy, &planner);
-        assert_eq!(said(PolicyKind::Mem), "4 looks follow a push before the next one");
-        assert_eq!(said(PolicyKind::Saturation), "nothing is pushed right after a push");
-    }
-
-    #[test]
-    fn what_looking_gains_is_not_shown_as_a_multiple_of_it() {
-        let mut decision = crate::workbench::fixture::session(1).moments[4].decision().expect("step 4").clone();
-        (decision.igv, decision.igm, decision.reg, decision.best_push) = (300.0, 400.0, -50.0, Some(0));
-        let bars = |patience, push_floor| -> Vec<(&str, f32)> {
-            let planner = PlannerSettings { patience, push_floor, ..PlannerSettings::default() };
-            compared(&decision, &planner).iter().map(|bar| (bar.name, bar.nats)).collect()
-        };
-        let (look, push) = (("Look (IGV)", 300.0), [("Push (IGM)", 400.0), ("Push: γ·Reg", -10.0)]);
-        assert_eq!(bars(1.0, 0.0), [look, push[0], push[1]], "the rule of the paper compares IGV itself");
-        assert_eq!(bars(10.0, 2000.0), [look, ("Threshold", 3000.0), push[0], push[1]]);
-        assert_eq!(bars(1.0, 2000.0), [look, ("Threshold", 2000.0), push[0], push[1]]);
-        let planner = PlannerSettings { patience: 10.0, push_floor: 5000.0, ..PlannerSettings::default() };
-        assert!(compared(&decision, &planner)[1].hint.contains("5000 nats at least"));
-    }
 }

@@ -15,7 +15,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         .as_ref()
         .map_or("largest".to_owned(), |source| format!("{} and more", words::significant(f64::from(source.top), 2)));
     let display = &mut model.kept.display;
-    if layout == LayoutKind::Gains {
+    if layout.shows_gain() {
         ui.horizontal(|ui| {
             ui.label("gain per voxel");
             scale(ui, Colormap::Cividis, "gain", ["0", &most], "nats");
@@ -90,7 +90,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
 }
 
 /// Width of a colour scale, points.
-const WIDTH: f32 = 150.0;
+const WIDTH: f32 = 210.0;
 
 /// A colour scale of a fixed width.
 fn scale(ui: &mut egui::Ui, map: Colormap, name: &str, ends: [&str; 2], unit: &str) {

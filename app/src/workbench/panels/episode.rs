@@ -55,12 +55,15 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
     if !scene.description.is_empty() {
         ui.weak(&scene.description);
     }
-    let hidden = session.setup.hidden.len();
-    ui.label(format!("{} objects, {hidden} hidden", scene.objects.len())).on_hover_text(if hidden == 0 {
-        "Every object shows in at least one of the candidate views".to_owned()
-    } else {
-        format!("No candidate view shows 25 pixels or more of: {}", session.setup.hidden.join(", "))
-    });
+    super::untold(ui, &session.record);
+    if session.record.has_truth() {
+        let hidden = session.setup.hidden.len();
+        ui.label(format!("{} objects, {hidden} hidden", scene.objects.len())).on_hover_text(if hidden == 0 {
+            "Every object shows in at least one of the candidate views".to_owned()
+        } else {
+            format!("No candidate view shows 25 pixels or more of: {}", session.setup.hidden.join(", "))
+        });
+    }
     let mut facts = vec![
         ("policy", config.policy.to_string()),
         ("belief", belief_title(&config.belief).to_owned()),

@@ -134,7 +134,7 @@ impl FloorMap<'_> {
         if ui.is_rect_visible(rect) {
             self.paint(ui, rect, &frame, over);
         }
-        let chosen = match super::arrows(ui, &response) {
+        let chosen = match super::arrow_keys(ui, &response) {
             Some(by) => Some(self.beside(by)),
             // Enter on a map that has the focus is a click without a place.
             None => response.clicked().then(|| over.unwrap_or_else(|| self.beside([0, 0]))),

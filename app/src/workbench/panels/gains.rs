@@ -2,7 +2,7 @@
 
 use super::facts::{self, fact};
 use super::legend::{self, Bar};
-use super::{NO_EPISODE, Touched, decision, empty, heading, spark, weighed, words};
+use super::{NO_EPISODE, Panel, Touched, decision, empty, heading, spark, weighed, words};
 use crate::colors::Colormap;
 use crate::workbench::command::Command;
 use crate::workbench::model::{GainSource, Hovered, Model};
@@ -34,15 +34,15 @@ struct Spread {
     total: f32,
 }
 
-/// Draws the heat maps and the chosen view's numbers.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.gains);
-    let touched = draw(&mut state, ui, model, ask);
-    if let Some(view) = touched.view {
-        ask.push(Command::GainOf(view));
+impl Panel for State {
+    /// Draws the heat maps and the chosen view's numbers.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        let touched = draw(self, ui, model, ask);
+        if let Some(view) = touched.view {
+            ask.push(Command::GainOf(view));
+        }
+        touched.apply(model, &mut self.hovering);
     }
-    touched.apply(model, &mut state.hovering);
-    model.panels.gains = state;
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
@@ -63,11 +63,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
     egui::ScrollArea::vertical().id_salt("gains").auto_shrink(false).show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 4.0;
         let step = model.cursor.min(session.steps()) + 1;
-        heading(
-            ui,
-            format!("Gain of every view before step {step}"),
-            weighed::view_gain(session.record.config.planner.counted),
-        );
+        heading(ui, format!("Gain of every view before step {step}"), decision.counted().of_a_view());
         map.show(ui, &mut touched);
         ui.add_space(6.0);
         let Some(view) = model.view.and_then(|view| session.setup.views.view(view)) else {
@@ -148,7 +144,7 @@ impl<'a> HeatMap<'a> {
         let views: Vec<&View> = self.views.views.iter().filter(|view| view.slot[2] == target).collect();
         let title = views.first().map_or("no views".to_owned(), |view| {
             let [x, y, z] = view.target.map(words::metres);
-            format!("looks at {x}, {y}, {z} m")
+            format!("at {x}, {y}, {z} m")
         });
         ui.label(RichText::new(title).small())
             .on_hover_text("The look-at target: x to the right, y into the shelf, z up");
@@ -192,7 +188,7 @@ impl<'a> HeatMap<'a> {
             let pointed = over.map(|view| view.id).or(self.hovered);
             views.iter().filter(|view| pointed == Some(view.id)).for_each(|view| ring(view, 1.0));
         }
-        if let Some([right, up]) = super::arrows(ui, &response) {
+        if let Some([right, up]) = super::arrow_keys(ui, &response) {
             let slot = views
                 .iter()
                 .find(|view| self.selected == Some(view.id))
@@ -281,7 +277,7 @@ fn spread(state: &mut State, ui: &mut Ui, model: &Model, session: &Session, view
                         colour: legend::ink(Colormap::Cividis.rgb(nats[part] / largest)),
                         strong: false,
                     };
-                    spark::bar(ui, &bar, 68.0, 36.0);
+                    spark::bar(ui, &bar, 84.0, 40.0);
                 }
             });
         }

@@ -3,7 +3,7 @@
 use super::floor::{Drawn, FloorMap, Outlines};
 use super::legend::{self, Bar};
 use super::textures::{self, Textures};
-use super::{NO_EPISODE, empty, heading, words};
+use super::{NO_EPISODE, Panel, empty, heading, words};
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture::{self, CellError};
 use crate::workbench::command::Command;
@@ -36,12 +36,11 @@ pub struct State {
     outlines: Outlines,
 }
 
-/// Draws the maps in two columns, in one where there is little room.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.maps);
-    let slice_m = draw(&mut state, ui, model, ask);
-    model.slice_m = slice_m;
-    model.panels.maps = state;
+impl Panel for State {
+    /// Draws the maps in two columns, in one where there is little room.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        model.slice_m = draw(self, ui, model, ask);
+    }
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Option<f32> {
@@ -63,7 +62,8 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
     slice_m = controls(ui, &derived.belief.grid, slice_m, derived.of.1, model.cursor.min(session.steps()));
     let level = slice_m.map(|height| level_at(&derived.belief.grid, height));
     let first = level.map_or(Shown::Map(MapKind::Semantics), Shown::Slice);
-    let kinds = MapKind::ALL[1..].iter().map(|kind| Shown::Map(*kind));
+    // The semantics stand first anyway.
+    let kinds = MapKind::ALL[1..].iter().filter(|kind| derived.maps.contains_key(kind)).map(|kind| Shown::Map(*kind));
     let shown: Vec<Shown> = std::iter::once(first).chain(kinds).collect();
     let gap = 10.0;
     let columns = if ui.available_width() < 300.0 { 1 } else { 2 };
@@ -79,7 +79,10 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -
                     ui.spacing_mut().item_spacing.y = 3.0;
                     match place {
                         Some(shown) => map(state, ui, model, session, &derived, *shown, ask),
-                        None => classes(ui, session),
+                        None => {
+                            classes(ui, session);
+                            super::untold(ui, &session.record);
+                        }
                     }
                 });
             }
@@ -154,7 +157,7 @@ fn map(
         format!(
             "{}\n{}",
             words::cell_place(&grid, grid.cell(cell)),
-            value(derived, &moment.truth, session, shown, cell)
+            value(derived, moment.truth.as_deref(), session, shown, cell)
         )
     });
     if let Some(cell) = drawn.chosen {
@@ -240,9 +243,10 @@ pub fn class_entries(session: &Session) -> Vec<(Rgb, String)> {
 }
 
 /// What a map shows of a cell, in words.
-fn value(derived: &Derived, truth: &TruthMap, session: &Session, shown: Shown, cell: usize) -> String {
+fn value(derived: &Derived, truth: Option<&TruthMap>, session: &Session, shown: Shown, cell: usize) -> String {
     let (belief, catalog) = (&derived.belief, &session.setup.catalog);
-    let true_class = || truth.labels.get(cell).map_or_else(String::new, |label| class_name(catalog, ClassId(*label)));
+    let true_label = truth.and_then(|truth| truth.labels.get(cell));
+    let true_class = || true_label.map_or_else(String::new, |label| class_name(catalog, ClassId(*label)));
     match shown {
         Shown::Slice(level) => {
             let a = belief.occupancy[belief.grid.column(cell).start + level];
@@ -265,13 +269,13 @@ fn value(derived: &Derived, truth: &TruthMap, session: &Session, shown: Shown, c
             format!("{}, of which the class {}", words::nats(all), words::nats(class))
         }
         Shown::Map(MapKind::Truth) => true_class(),
-        Shown::Map(MapKind::Error) if cell < truth.labels.len() => {
+        Shown::Map(MapKind::Error) => {
+            let Some(truth) = truth.filter(|truth| cell < truth.labels.len()) else { return String::new() };
             let believed =
                 picture::believed_class(belief, cell).map_or("unknown".to_owned(), |class| class_name(catalog, class));
             let error = picture::cell_error(belief, truth, cell).title();
             format!("{error}: believed {believed}, really {}", true_class())
         }
-        Shown::Map(MapKind::Error) => String::new(),
     }
 }
 

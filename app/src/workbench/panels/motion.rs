@@ -3,32 +3,15 @@
 use super::facts::{self, fact};
 use super::{heading, words};
 use crate::record::mishaps;
+use crate::workbench::model::Scrubbed;
 use crate::workbench::session::{Moment, SessionId};
 use nudge_core::arm::PhaseKind;
 use nudge_core::episode::StepOutcome;
 use nudge_core::plan::Action;
 use re_viewer::external::egui::{self, Ui};
 
-/// What the panel remembers: which step is scrubbed, and how far, seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct State {
-    scrubbed: Option<((SessionId, usize), f64)>,
-}
-
-impl State {
-    /// How far the motion of a step is scrubbed, seconds; `None` where nobody scrubs it.
-    pub fn at_s(&self, step: (SessionId, usize)) -> Option<f64> {
-        self.scrubbed.filter(|(of, _)| *of == step).map(|(_, at_s)| at_s)
-    }
-
-    /// Moves the arm to a time in the motion of a step, seconds.
-    pub fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
-        self.scrubbed = Some((step, at_s));
-    }
-}
-
 /// Draws times, mishaps and slider of the motion that led to `moment`, if there was one.
-pub fn show(ui: &mut Ui, state: &mut State, id: SessionId, moment: &Moment) {
+pub fn show(ui: &mut Ui, scrubbed: &mut Scrubbed, id: SessionId, moment: &Moment) {
     let Some(outcome) = moment.outcome.as_deref() else { return };
     let Some(motion) = outcome.motion.as_ref() else { return };
     let end = motion.duration_s();
@@ -42,22 +25,22 @@ pub fn show(ui: &mut Ui, state: &mut State, id: SessionId, moment: &Moment) {
         ui.label(mishap.replace('_', " "));
     }
     let step = (id, moment.step);
-    let mut at_s = state.at_s(step).unwrap_or(0.0);
+    let mut at_s = scrubbed.at_s(step).unwrap_or(0.0);
     ui.horizontal(|ui| {
         ui.spacing_mut().slider_width = (ui.available_width() - 150.0).clamp(80.0, 400.0);
         let slider = egui::Slider::new(&mut at_s, 0.0..=end).fixed_decimals(1).suffix(" s");
         let response = ui.add(slider).on_hover_text("Drag to move the arm along its motion");
         response.widget_info(|| egui::WidgetInfo::slider(true, at_s, "Time in the arm's motion"));
         if response.changed() {
-            state.scrubbed = Some((step, at_s));
+            scrubbed.scrub(step, at_s);
         }
-        let scrubbed = state.at_s(step).is_some();
+        let is_scrubbed = scrubbed.at_s(step).is_some();
         if ui
-            .add_enabled(scrubbed, egui::Button::new("Hide arm"))
+            .add_enabled(is_scrubbed, egui::Button::new("Hide arm"))
             .on_hover_text("Show the step without the arm again")
             .clicked()
         {
-            state.scrubbed = None;
+            scrubbed.hide();
         }
     });
 }

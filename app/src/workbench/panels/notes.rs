@@ -78,7 +78,10 @@ fn verdicts(ui: &mut egui::Ui, session: &Session, step: usize, ask: &mut Vec<Com
         ui.weak("Objects are judged after the first step");
         return;
     };
-    let judged = session.annotations.judge(step, &outcome.record.objects);
+    if !session.record.has_truth() {
+        return super::untold(ui, &session.record);
+    }
+    let judged = session.annotations.judge(step, outcome.record.objects());
     totals(ui, &judged);
     ui.add_space(4.0);
     ui.spacing_mut().item_spacing.y = 0.0;

@@ -9,17 +9,16 @@ use super::motion;
 use super::push_review::{self, Review};
 use super::table::Sort;
 use super::textures::{self, Textures};
-use super::weighed;
 use super::{NO_EPISODE, Touched, empty, heading, maps, words};
 use crate::colors::Colormap;
 use crate::picture;
 use crate::workbench::command::Command;
 use crate::workbench::derive::{Derived, MapKind};
-use crate::workbench::model::{Hovered, Model, Picked, Preview};
+use crate::workbench::model::{Hovered, Model, Picked, Preview, Scrubbed};
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::belief::{MOST_SURPRISING, Prediction};
 use nudge_core::grid::Grid;
-use nudge_core::plan::{Action, CandidateRecord, Decision};
+use nudge_core::plan::{Action, CandidateRecord, DISTURBANCE, Decision};
 use nudge_core::skill::Manipulation;
 use re_viewer::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
 use std::sync::Arc;
@@ -46,7 +45,8 @@ pub struct State {
     rejected: bool,
     hovering: bool,
     review: Option<Review>,
-    motion: motion::State,
+    /// The model's, while the panel is drawn.
+    scrubbed: Scrubbed,
 }
 
 impl Default for State {
@@ -56,31 +56,23 @@ impl Default for State {
             textures: Textures::default(),
             outlines: Outlines::default(),
             outlines_after: Outlines::default(),
-            sort: Sort::falling(1),
+            sort: Sort::as_given(),
             rejected: false,
             hovering: false,
             review: None,
-            motion: motion::State::default(),
+            scrubbed: Scrubbed::default(),
         }
     }
 }
 
-impl State {
-    pub(super) fn motion_s(&self, step: (SessionId, usize)) -> Option<f64> {
-        self.motion.at_s(step)
+impl super::Panel for State {
+    /// Draws the candidates and what the chosen one would do.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        self.scrubbed = model.scrubbed;
+        let touched = draw(self, ui, model, ask);
+        model.scrubbed = self.scrubbed;
+        touched.apply(model, &mut self.hovering);
     }
-
-    pub(super) fn scrub(&mut self, step: (SessionId, usize), at_s: f64) {
-        self.motion.scrub(step, at_s);
-    }
-}
-
-/// Draws the candidates and what the chosen one would do.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
-    let mut state = std::mem::take(&mut model.panels.push);
-    let touched = draw(&mut state, ui, model, ask);
-    touched.apply(model, &mut state.hovering);
-    model.panels.push = state;
 }
 
 fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) -> Touched {
@@ -136,12 +128,12 @@ impl Here<'_> {
         heading(ui, title, "Every arrow is the path of the tool's tip; the colour is its value, gain + γ·Reg in nats");
         self.floor(state, ui, decision, touched, ask);
         let State { sort, rejected, .. } = state;
-        let table = decision::push_table(ui, sort, rejected, self.model, self.session, decision, 190.0);
+        let table = decision::push_table(ui, sort, rejected, self.model, decision, 190.0);
         decision::apply_push(table, decision, touched, ask);
         decision::push_button(ui, self.session, self.model, decision, ask);
         ui.add_space(6.0);
         match self.model.candidate.and_then(|at| Some((at, decision.candidates.get(at)?))) {
-            Some((at, candidate)) => self.chosen(state, ui, at, candidate, ask),
+            Some((at, candidate)) => self.chosen(state, ui, decision, at, candidate, ask),
             None => {
                 ui.weak("Click a push to see what it would do");
             }
@@ -176,8 +168,7 @@ impl Here<'_> {
         };
         let width = ui.available_width().min(620.0);
         let drawn = map.show(ui, width);
-        let gamma = self.session.record.config.planner.gamma;
-        let range = value_range(decision, gamma);
+        let range = value_range(decision);
         let arrows: Vec<(usize, &CandidateRecord, [Pos2; 2])> = decision
             .candidates
             .iter()
@@ -193,17 +184,16 @@ impl Here<'_> {
         };
         let painter = ui.painter_at(drawn.response.rect);
         // The rejected below, the best on top.
-        let mut order: Vec<&(usize, &CandidateRecord, [Pos2; 2])> = arrows.iter().collect();
-        let rank = |candidate: &CandidateRecord| weighed::value(candidate, gamma).unwrap_or(f32::NEG_INFINITY);
-        order.sort_by(|a, b| rank(a.1).total_cmp(&rank(b.1)));
-        let pushed = weighed::pushed(decision);
+        let ranked = decision.ranked_candidates();
+        let order = ranked.iter().rev().filter_map(|at| arrows.iter().find(|arrow| arrow.0 == *at));
+        let pushed = decision.pushed();
         for (at, candidate, ends) in order {
             let picked =
                 self.model.candidate == Some(*at) || over == Some(*at) || hovered == Some(candidate.manipulation);
             if picked {
                 lines(&painter, &drawn.frame, &candidate.manipulation.outline());
             }
-            let look = match weighed::value(candidate, gamma) {
+            let look = match decision.value_of(candidate) {
                 _ if candidate.rejection.is_some() => Look::Rejected,
                 Some(value) => Look::Weighed(legend::ink(Colormap::Cividis.of(value, range))),
                 None => Look::Weighed(Color32::WHITE),
@@ -216,14 +206,14 @@ impl Here<'_> {
         }
         if let Some((at, candidate)) = over.and_then(|at| Some((at, decision.candidates.get(at)?))) {
             touched.over = Some(Hovered::Manipulation(candidate.manipulation));
-            let text = describe(at, candidate, gamma);
+            let text = describe(at, decision, candidate);
             Tooltip::for_widget(&drawn.response).at_pointer().gap(12.0).show(|ui| ui.label(text));
             if drawn.response.clicked() {
                 touched.candidate = Some(at);
                 ask.push(Command::Preview(candidate.manipulation));
             }
         }
-        if decision.candidates.iter().all(|candidate| weighed::value(candidate, gamma).is_none()) {
+        if decision.candidates.iter().all(|candidate| decision.value_of(candidate).is_none()) {
             ui.label(RichText::new("white: not weighed, this policy pushes at random").small().weak());
         } else {
             ui.scope(|ui| {
@@ -238,16 +228,23 @@ impl Here<'_> {
     }
 
     /// What a push would do: now, predicted, the change, and what happened if it was done.
-    fn chosen(&self, state: &mut State, ui: &mut Ui, at: usize, candidate: &CandidateRecord, ask: &mut Vec<Command>) {
-        let gamma = self.session.record.config.planner.gamma;
+    fn chosen(
+        &self,
+        state: &mut State,
+        ui: &mut Ui,
+        decision: &Decision,
+        at: usize,
+        candidate: &CandidateRecord,
+        ask: &mut Vec<Command>,
+    ) {
         let name = words::capital(candidate.manipulation.kind().name());
         heading(ui, format!("{name} {at}"), "What is looked at; click another one in the table or on the map");
         let nats = |value: Option<f32>| value.map_or("not weighed".to_owned(), words::nats);
         let view = candidate.view.map_or("n/a".to_owned(), |view| view.0.to_string());
         let mut facts = vec![
-            fact("value", nats(weighed::value(candidate, gamma)), "Gain + γ·Reg"),
-            fact("gain", nats(candidate.gain), weighed::push_gain(self.session.record.config.planner.counted)),
-            fact("γ·Reg", nats(candidate.reg.map(|reg| gamma * reg)), weighed::DISTURBANCE),
+            fact("value", nats(decision.value_of(candidate)), "Gain + γ·Reg"),
+            fact("gain", nats(candidate.gain), decision.counted().of_a_push()),
+            fact("γ·Reg", nats(decision.disturbance_of(candidate)), DISTURBANCE),
             fact("best view", view, "The view with the largest gain under the predicted belief"),
         ];
         let told = candidate.manipulation.describe();
@@ -293,8 +290,8 @@ impl Here<'_> {
         let after = self.session.moments.get(self.step + 1).filter(|moment| {
             moment.outcome.as_ref().is_some_and(|outcome| outcome.record.action == Action::Manipulate(done))
         });
-        let happened = after.map(|moment| {
-            let labels = || textures::of_rgb(&picture::paint_labels(&grid, &moment.truth.labels, catalog));
+        let happened = after.and_then(|moment| Some((moment, moment.truth.as_ref()?))).map(|(moment, truth)| {
+            let labels = || textures::of_rgb(&picture::paint_labels(&grid, &truth.labels, catalog));
             (state.textures.get(&ctx, key(Shown::After), labels), state.outlines_after.of(&moment.bodies))
         });
         let outlines = state.outlines.of(&self.session.moment(self.step).bodies);
@@ -394,16 +391,17 @@ impl Here<'_> {
         ui.add_space(8.0);
         push_review::show(ui, &review, &self.session.record, moment);
         self.surprise(state, ui);
-        motion::show(ui, &mut state.motion, self.session.id, moment);
+        motion::show(ui, &mut state.scrubbed, self.session.id, moment);
     }
 
     /// Where the push that led to the state at the cursor did what was not expected of it.
     fn surprise(&self, state: &mut State, ui: &mut Ui) {
         let (before, after) = (self.session.moment(self.step - 1), self.session.moment(self.step));
         let Some(prediction) = after.outcome.as_ref().and_then(|outcome| outcome.prediction.as_ref()) else { return };
+        let Some((truth_before, truth_after)) = before.truth.as_ref().zip(after.truth.as_ref()) else { return };
         let (grid, ctx) = (self.grid, ui.ctx().clone());
         let picture = state.textures.get(&ctx, (self.session.id, self.step, Shown::Surprise), || {
-            let surprise = prediction.surprise(&grid, &before.truth.changed_cells(&after.truth));
+            let surprise = prediction.surprise(&grid, &truth_before.changed_cells(truth_after));
             textures::of_rgb(&picture::paint_surprise(&grid, &surprise))
         });
         let outlines = state.outlines_after.of(&after.bodies);
@@ -427,8 +425,8 @@ impl Here<'_> {
 }
 
 /// From the least to the largest value of the feasible candidates.
-fn value_range(decision: &Decision, gamma: f32) -> [f32; 2] {
-    let values = decision.candidates.iter().filter_map(|candidate| weighed::value(candidate, gamma));
+fn value_range(decision: &Decision) -> [f32; 2] {
+    let values = decision.candidates.iter().filter_map(|candidate| decision.value_of(candidate));
     let [low, high] =
         values.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
     if low <= high { [low, high] } else { [0.0, 0.0] }
@@ -441,14 +439,14 @@ fn change_at(prediction: &Prediction, grid: &Grid, cell: usize) -> f32 {
 }
 
 /// A candidate in words, for the tooltip.
-fn describe(at: usize, candidate: &CandidateRecord, gamma: f32) -> String {
+fn describe(at: usize, decision: &Decision, candidate: &CandidateRecord) -> String {
     let name = words::capital(candidate.manipulation.kind().name());
-    match (&candidate.rejection, weighed::value(candidate, gamma)) {
+    match (&candidate.rejection, decision.value_of(candidate)) {
         (Some(rejection), _) => format!("{name} {at}, rejected: {}", candidate.manipulation.against(rejection)),
         (None, None) => format!("{name} {at}: not weighed"),
         (None, Some(value)) => {
             let gain = words::nats(candidate.gain.unwrap_or(0.0));
-            let reg = words::nats(gamma * candidate.reg.unwrap_or(0.0));
+            let reg = words::nats(decision.disturbance_of(candidate).unwrap_or(0.0));
             format!("{name} {at}: {}\ngain {gain}, γ·Reg {reg}", words::nats(value))
         }
     }

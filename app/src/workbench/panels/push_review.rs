@@ -20,10 +20,10 @@ pub struct Review {
     pub of: (SessionId, usize),
     /// Cells that were predicted to change; `None` if nothing was predicted.
     pub predicted: Option<usize>,
-    /// Cells in which something really changed.
-    pub changed: usize,
-    /// Cells that were predicted to change and did.
-    pub both: usize,
+    /// Cells in which something really changed; `None` without a truth.
+    pub changed: Option<usize>,
+    /// Cells that were predicted to change and did; `None` without a truth.
+    pub both: Option<usize>,
     /// How surprising what happened is, all floor cells together, nats; `None` if nothing was predicted.
     pub surprise_nats: Option<f32>,
 }
@@ -33,25 +33,30 @@ impl Review {
     pub fn of(id: SessionId, before: &Moment, after: &Moment) -> Self {
         let grid = after.belief.grid();
         let prediction = after.outcome.as_ref().and_then(|outcome| outcome.prediction.as_ref());
-        let changed = before.truth.changed_cells(&after.truth);
+        let changed =
+            before.truth.as_ref().zip(after.truth.as_ref()).map(|(before, after)| before.changed_cells(after));
         let predicted = prediction.map(|prediction| predicted_cells(grid, prediction));
         let count = |cells: &[bool]| cells.iter().filter(|cell| **cell).count();
-        let both = predicted.as_ref().map_or(0, |predicted| {
-            predicted.iter().zip(&changed).filter(|(predicted, changed)| **predicted && **changed).count()
+        let both = changed.as_ref().map(|changed| {
+            let marked = |predicted: &Vec<bool>| predicted.iter().zip(changed).filter(|(a, b)| **a && **b).count();
+            predicted.as_ref().map_or(0, marked)
         });
-        let surprise_nats = prediction.map(|prediction| prediction.surprise(grid, &changed).iter().sum());
+        let surprise = prediction.zip(changed.as_ref()).map(|(prediction, changed)| prediction.surprise(grid, changed));
+        let surprise_nats = surprise.map(|surprise| surprise.iter().sum());
         let predicted = predicted.as_deref().map(count);
-        Self { of: (id, after.step), predicted, changed: count(&changed), both, surprise_nats }
+        Self { of: (id, after.step), predicted, changed: changed.as_deref().map(count), both, surprise_nats }
     }
 
     /// Share of the cells predicted to change that did.
     fn precision(&self) -> Option<f32> {
-        self.predicted.filter(|predicted| *predicted > 0).map(|predicted| self.both as f32 / predicted as f32)
+        let predicted = self.predicted.filter(|predicted| *predicted > 0)?;
+        Some(self.both? as f32 / predicted as f32)
     }
 
     /// Share of the cells that changed which were predicted to.
     fn recall(&self) -> Option<f32> {
-        (self.predicted.is_some() && self.changed > 0).then(|| self.both as f32 / self.changed as f32)
+        let changed = self.changed.filter(|changed| *changed > 0 && self.predicted.is_some())?;
+        Some(self.both? as f32 / changed as f32)
     }
 }
 
@@ -73,11 +78,12 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
     let moved = pushed.displacement_m.iter().filter(|m| **m > 0.002).count();
     let total: f32 = pushed.displacement_m.iter().filter(|m| m.is_finite()).sum();
     let share = |share: Option<f32>| share.map_or("n/a".to_owned(), words::percent);
-    let dropped = if outcome.record.dropped.is_empty() {
+    let dropped = if outcome.record.dropped().is_empty() {
         "nothing".to_owned()
     } else {
-        outcome.record.dropped.join(", ").replace('_', " ")
+        outcome.record.dropped().join(", ").replace('_', " ")
     };
+    let number = |number: Option<usize>| number.map_or("n/a".to_owned(), |number| number.to_string());
     let predicted = review.predicted.map_or("n/a".to_owned(), |cells| cells.to_string());
     let facts = [
         fact(
@@ -93,9 +99,9 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
         ),
         fact("blocked", if pushed.stalled { "yes" } else { "no" }, "Whether the arm met too much force and stopped"),
         fact("dropped", dropped, "Objects that left the board"),
-        fact("cells changed", review.changed.to_string(), "Floor cells in whose column something really changed"),
+        fact("cells changed", number(review.changed), "Floor cells in whose column something really changed"),
         fact("predicted to change", predicted, "Floor cells with a predicted probability of change above 0.5"),
-        fact("of these, changed", review.both.to_string(), "Cells that were predicted to change and did"),
+        fact("of these, changed", number(review.both), "Cells that were predicted to change and did"),
         fact("precision", share(review.precision()), "Share of the cells predicted to change that did"),
         fact("recall", share(review.recall()), "Share of the cells that changed which were predicted to"),
         fact(
@@ -104,7 +110,11 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
             "−ln of the probability given to what happened, all floor cells together",
         ),
     ];
+    // What only somebody who knows the truth can say.
+    let told = |name: &str| ["tool went", "blocked", "predicted to change"].contains(&name);
+    let facts: Vec<_> = facts.into_iter().filter(|fact| record.has_truth() || told(fact.name)).collect();
     facts::show(ui, "push review", 2, &facts);
+    super::untold(ui, record);
 }
 
 #[cfg(test)]
@@ -142,9 +152,10 @@ mod tests {
         // Changed and expected to; not changed but rather expected to; half; unknown; outside: one that changed, and others.
         let expected = [0.1_f32, 0.92, 0.69, 0.69, 0.0, 4.6, 0.0, 0.0];
         assert!(surprise.iter().zip(expected).all(|(nats, expected)| (nats - expected).abs() < 0.01), "{surprise:?}");
-        let review = Review { of: (SessionId(0), 1), predicted: Some(2), changed: 2, both: 1, surprise_nats: None };
+        let review =
+            Review { of: (SessionId(0), 1), predicted: Some(2), changed: Some(2), both: Some(1), surprise_nats: None };
         assert_eq!((review.precision(), review.recall()), (Some(0.5), Some(0.5)));
-        let blind = Review { predicted: None, both: 0, ..review };
+        let blind = Review { predicted: None, both: Some(0), ..review };
         assert_eq!((blind.precision(), blind.recall()), (None, None));
     }
 }

@@ -34,7 +34,7 @@ impl Spark<'_> {
         });
         let font = legend::small(ui);
         let (text, weak) = (ui.visuals().text_color(), ui.visuals().weak_text_color());
-        let plot = egui::Rect::from_min_max(pos2(rect.left() + 70.0, rect.top() + 3.0), rect.max - vec2(70.0, 3.0));
+        let plot = egui::Rect::from_min_max(pos2(rect.left() + 70.0, rect.top() + 3.0), rect.max - vec2(88.0, 3.0));
         let [low, high] = self.range;
         let x = |step: usize| egui::lerp(plot.x_range(), if last > 0 { step as f32 / last as f32 } else { 0.5 });
         let y = |value: f32| {

@@ -63,8 +63,8 @@ pub struct Row {
 /// By which column a table is sorted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sort {
-    /// Its position.
-    pub column: usize,
+    /// Its position; `None` leaves the rows in the order in which they are given.
+    pub column: Option<usize>,
     /// The largest first.
     pub falling: bool,
 }
@@ -72,17 +72,23 @@ pub struct Sort {
 impl Sort {
     /// The largest of a column first.
     pub fn falling(column: usize) -> Self {
-        Self { column, falling: true }
+        Self { column: Some(column), falling: true }
+    }
+
+    /// As the rows are given.
+    pub fn as_given() -> Self {
+        Self { column: None, falling: true }
     }
 
     /// What a click on a column's heading leads to.
     fn click(&mut self, column: usize) {
-        *self = Self { column, falling: if self.column == column { !self.falling } else { true } };
+        *self = Self { column: Some(column), falling: self.column != Some(column) || !self.falling };
     }
 
     /// Sorts rows; what is no number comes last, equals stay in their order.
     fn apply(self, rows: &mut [Row]) {
-        let order = |a: &Row, b: &Row| match (a.cells.get(self.column), b.cells.get(self.column)) {
+        let Some(column) = self.column else { return };
+        let order = |a: &Row, b: &Row| match (a.cells.get(column), b.cells.get(column)) {
             (Some(Cell::Figure(a, _)), Some(Cell::Figure(b, _))) => match (a.is_nan(), b.is_nan()) {
                 (false, false) if self.falling => b.total_cmp(a),
                 (false, false) => a.total_cmp(b),
@@ -132,7 +138,7 @@ pub fn show(ui: &mut Ui, id: &str, columns: &[Column], mut rows: Vec<Row>, sort:
             .header(line + 1.0, |mut header| {
                 for (at, column) in columns.iter().enumerate() {
                     header.col(|ui| {
-                        if heading(ui, column, (sort.column == at).then_some(sort.falling)) {
+                        if heading(ui, column, (sort.column == Some(at)).then_some(sort.falling)) {
                             sort.click(at);
                         }
                     });
@@ -218,5 +224,15 @@ mod tests {
         sort.click(0);
         sort.apply(&mut rows);
         assert_eq!(keys(&rows), [0, 2, 1]);
+    }
+
+    #[test]
+    fn rows_stay_as_they_are_given_until_a_heading_is_clicked() {
+        let mut sort = Sort::as_given();
+        let mut rows = vec![row(0, 2.0), row(1, 1.0), row(2, 3.0)];
+        sort.apply(&mut rows);
+        assert_eq!(rows.iter().map(|row| row.key).collect::<Vec<_>>(), [0, 1, 2]);
+        sort.click(0);
+        assert_eq!(sort, Sort::falling(0));
     }
 }

@@ -1,7 +1,6 @@
 //! The panels on a real short episode, by what a person sees and presses; and their pictures, for a person to look at.
 
 use super::*;
-use crate::workbench::command::Command;
 use crate::workbench::fixture;
 use crate::workbench::model::{LayoutKind, Picked};
 use crate::workbench::session::{Activity, Moment};
@@ -14,29 +13,32 @@ use std::sync::Arc;
 mod form;
 mod look;
 
-type Show = fn(&mut egui::Ui, &mut Model, &mut Vec<Command>);
-
-const PANELS: [(&str, Show); 8] = [
-    ("maps", maps::show),
-    ("camera", camera::show),
-    ("curves", curves::show),
-    ("decision", decision::show),
-    ("why", why::show),
-    ("gains", gains::show),
-    ("push", push::show),
-    ("compare", compare::show),
+/// The panels of an episode, each as it is before it has drawn anything.
+const PANELS: [(&str, fn() -> Box<dyn Panel>); 8] = [
+    ("maps", || Box::new(maps::State::default())),
+    ("camera", || Box::new(camera::State::default())),
+    ("curves", || Box::new(curves::show)),
+    ("decision", || Box::new(decision::State::default())),
+    ("why", || Box::new(why::show)),
+    ("gains", || Box::new(gains::State::default())),
+    ("push", || Box::new(push::State::default())),
+    ("compare", || Box::new(compare::State::default())),
 ];
 
-/// A model and what was asked for.
+/// A model, a panel and what was asked for.
 struct Stage {
     model: Model,
     asked: Vec<Command>,
-    show: Show,
+    panel: Box<dyn Panel>,
 }
 
-fn harness(show: Show, model: Model) -> Harness<'static, Stage> {
-    let draw = |ui: &mut egui::Ui, stage: &mut Stage| (stage.show)(ui, &mut stage.model, &mut stage.asked);
-    let stage = Stage { model, asked: Vec::new(), show };
+fn harness(panel: impl Panel + 'static, model: Model) -> Harness<'static, Stage> {
+    harness_of(Box::new(panel), model)
+}
+
+fn harness_of(panel: Box<dyn Panel>, model: Model) -> Harness<'static, Stage> {
+    let draw = |ui: &mut egui::Ui, stage: &mut Stage| stage.panel.show(ui, &mut stage.model, &mut stage.asked);
+    let stage = Stage { model, asked: Vec::new(), panel };
     let mut harness = Harness::builder().with_size([640.0, 900.0]).build_ui_state(draw, stage);
     harness.run_steps(3);
     harness
@@ -64,20 +66,20 @@ fn asked<T>(harness: &Harness<'_, Stage>, is: impl Fn(&Command) -> Option<T>) ->
 
 #[test]
 fn without_an_episode_every_panel_says_what_to_do() {
-    for (name, show) in PANELS {
-        let harness = harness(show, Model::default());
+    for (name, panel) in PANELS {
+        let harness = harness_of(panel(), Model::default());
         assert!(has(&harness, "Open a scene, or drop one here"), "{name}");
     }
 }
 
 #[test]
 fn every_panel_draws_every_state() {
-    for (name, show) in PANELS {
+    for (name, panel) in PANELS {
         let mut model = fixture::model_of(vec![fixture::session(1), fixture::stray_session(2)]);
         model.other = Some(model.sessions[1].id);
         model.kept.layout = LayoutKind::Compare;
         (model.picked, model.view, model.candidate) = (Some(Picked::Voxel(777)), Some(ViewId(3)), Some(0));
-        let mut harness = harness(show, model);
+        let mut harness = harness_of(panel(), model);
         for cursor in 0..=7 {
             harness.state_mut().model.cursor = cursor;
             harness.run_steps(2);
@@ -90,9 +92,9 @@ fn every_panel_draws_every_state() {
         harness.state_mut().model.slice_m = Some(f32::NAN);
         harness.run_steps(2);
         // Before anything is painted, and with an episode that has only its prior and nothing pending.
+        harness.state_mut().panel = panel();
         let model = &mut harness.state_mut().model;
         model.derived.clear();
-        model.panels = State::default();
         model.sessions[0].moments.truncate(1);
         model.sessions[0].pending = None;
         model.sessions[0].record.steps.clear();
@@ -103,7 +105,7 @@ fn every_panel_draws_every_state() {
 
 #[test]
 fn numbers_that_are_none_and_other_arrays_do_no_harm() {
-    for (_, show) in PANELS {
+    for (_, panel) in PANELS {
         let mut model = fixture::model();
         let mut decision = (*model.sessions[0].pending.clone().expect("pending")).clone();
         (decision.igv, decision.igm, decision.reg) = (f32::NAN, f32::INFINITY, f32::NAN);
@@ -122,14 +124,14 @@ fn numbers_that_are_none_and_other_arrays_do_no_harm() {
         views.views.truncate(2);
         model.sessions[0].setup.views = Arc::new(views);
         (model.view, model.candidate) = (Some(ViewId(1)), Some(0));
-        let mut harness = harness(show, model);
+        let mut harness = harness_of(panel(), model);
         harness.run_steps(2);
     }
 }
 
 #[test]
 fn a_click_on_a_map_asks_about_its_cell() {
-    let mut harness = harness(maps::show, fixture::model());
+    let mut harness = harness(maps::State::default(), fixture::model());
     for title in ["Semantics", "Certainty", "Entropy", "Truth", "Error", "Classes"] {
         assert!(harness.query_by_label(title).is_some(), "{title}");
     }
@@ -147,7 +149,7 @@ fn a_click_on_a_map_asks_about_its_cell() {
 
 #[test]
 fn maps_stay_until_the_next_are_painted_and_a_slice_takes_the_first_place() {
-    let mut harness = harness(maps::show, fixture::model());
+    let mut harness = harness(maps::State::default(), fixture::model());
     let model = &mut harness.state_mut().model;
     model.cursor = 2;
     model.derived.clear();
@@ -165,7 +167,7 @@ fn maps_stay_until_the_next_are_painted_and_a_slice_takes_the_first_place() {
 
 #[test]
 fn the_camera_shows_the_last_look() {
-    let mut harness = harness(camera::show, fixture::model());
+    let mut harness = harness(camera::State::default(), fixture::model());
     let model = &mut harness.state_mut().model;
     // The fourth action is a push: the image of the third stays.
     model.cursor = 4;
@@ -193,7 +195,7 @@ fn a_click_on_the_curves_moves_the_cursor() {
 
 #[test]
 fn the_decision_says_what_why_and_lets_a_person_do_something_else() {
-    let mut harness = harness(decision::show, fixture::model());
+    let mut harness = harness(decision::State::default(), fixture::model());
     assert!(has(&harness, "Step 6 of 6") && has(&harness, "because nothing is pushed in the last step"));
     // The second row of the views: pointing at it, then choosing it.
     let rows: Vec<egui::Rect> = harness.query_all_by_label_contains(", gain ").map(|row| row.rect()).collect();
@@ -220,7 +222,7 @@ fn nothing_else_can_be_done_in_the_past_or_while_busy() {
     let disabled = |harness: &Harness<'_, Stage>| harness.get_by_label("Look from here").accesskit_node().is_disabled();
     let mut model = fixture::model();
     model.view = Some(ViewId(3));
-    let mut harness = harness(decision::show, model);
+    let mut harness = harness(decision::State::default(), model);
     assert!(!disabled(&harness));
     harness.state_mut().model.sessions[0].activity = Activity::Running;
     harness.run_steps(2);
@@ -233,7 +235,7 @@ fn nothing_else_can_be_done_in_the_past_or_while_busy() {
 
 #[test]
 fn a_click_on_a_heading_sorts() {
-    let mut harness = harness(decision::show, fixture::model());
+    let mut harness = harness(decision::State::default(), fixture::model());
     let first = |harness: &Harness<'_, Stage>| {
         let rows = harness.query_all_by_label_contains(", gain ");
         let top = rows.min_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).expect("rows");
@@ -252,7 +254,7 @@ fn a_click_on_a_heading_sorts() {
 fn why_tells_the_causes_of_a_swept_voxel() {
     let mut model = fixture::model();
     let outcome = model.sessions[0].moments[4].outcome.clone().expect("step 4");
-    let swept = &outcome.intervention.as_ref().expect("step 4 is a push").swept;
+    let swept = &outcome.swept.as_ref().expect("step 4 is a push").swept;
     let voxel = swept.iter().nth(swept.len() / 2).expect("sweeps something");
     model.picked = Some(Picked::Voxel(voxel));
     let mut harness = harness(why::show, model);
@@ -305,7 +307,7 @@ fn why_names_the_label_that_a_cell_was_given() {
 
 #[test]
 fn a_click_on_a_heat_map_explains_a_view() {
-    let mut harness = harness(gains::show, fixture::model());
+    let mut harness = harness(gains::State::default(), fixture::model());
     assert_eq!(harness.query_all_by_label_contains("Gain of the views at target").count(), 3);
     let map = harness.get_by_label("Gain of the views at target 2").rect();
     let at = map.left_bottom() + egui::vec2(2.0, -2.0);
@@ -324,14 +326,14 @@ fn a_click_on_a_heat_map_explains_a_view() {
 fn a_push_is_predicted_and_then_judged() {
     let mut model = fixture::model();
     model.cursor = 3;
-    let mut harness = harness(push::show, model);
+    let mut harness = harness(push::State::default(), model);
     let row = harness.query_all_by_label_contains(", value ").next().expect("a feasible push").rect();
     click_at(&mut harness, row.center());
     assert!(harness.state().model.candidate.is_some());
     assert!(asked(&harness, |command| matches!(command, Command::Preview(_)).then_some(())).is_some());
     let model = &mut harness.state_mut().model;
     let decision = model.sessions[0].moments[4].decision().expect("step 4").clone();
-    model.candidate = weighed::pushed(&decision);
+    model.candidate = decision.pushed();
     fixture::answer(model);
     harness.run_steps(2);
     for title in ["Now", "Predicted", "Change", "What happened"] {
@@ -346,7 +348,7 @@ fn a_push_is_predicted_and_then_judged() {
 fn a_comparison_tells_where_two_episodes_part() {
     let mut model = fixture::model_of(vec![fixture::session(1), fixture::stray_session(2)]);
     model.kept.layout = LayoutKind::Compare;
-    let mut harness = harness(compare::show, model);
+    let mut harness = harness(compare::State::default(), model);
     assert!(has(&harness, "Choose a second episode"));
     harness.state_mut().model.other = Some(crate::workbench::session::SessionId(2));
     harness.run_steps(2);
@@ -364,7 +366,7 @@ fn a_comparison_tells_where_two_episodes_part() {
 fn steps_without_a_push_offer_the_way_to_the_nearest() {
     let mut model = fixture::model();
     model.cursor = 0;
-    let mut harness = harness(push::show, model);
+    let mut harness = harness(push::State::default(), model);
     assert!(has(&harness, "No push was weighed before step 1"));
     harness.get_by_label("Go to the push of step 4").click();
     harness.run_steps(2);
@@ -384,14 +386,15 @@ fn a_push_that_was_blocked_early_tells_the_length_that_was_planned() {
     push.length_m = 0.14;
     outcome.record.action = Action::Manipulate(push.into());
     // What it swept ends where the arm was blocked.
-    outcome.intervention.as_mut().expect("told").stroke.length_m = 0.05;
+    let early = nudge_core::skill::Push { length_m: 0.05, ..push };
+    outcome.swept.as_mut().expect("swept").manipulation = early.into();
     let report = outcome.record.push.as_mut().expect("a report");
     (report.pushed_m, report.stalled) = (0.05, true);
     let pushed = outcome.manipulated.as_mut().expect("an outcome");
     (pushed.way_m, pushed.stalled) = (0.05, true);
     model.sessions[0].moments[4] = Arc::new(Moment { outcome: Some(Arc::new(outcome)), ..(*moment).clone() });
     model.cursor = 4;
-    let harness = harness(push::show, model);
+    let harness = harness(push::State::default(), model);
     assert!(has(&harness, "What the push of step 4 did") && harness.query_by_label("50 of 140 mm").is_some());
     assert!(has(&harness, "the arm was blocked after 50 of 140 mm of its push") && !has(&harness, "50 of 50"));
 }

@@ -4,7 +4,7 @@ use super::table::{Cell, Column, Row};
 use super::words;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::EpisodeRecord;
-use nudge_core::plan::{Action, CandidateRecord, Counted, Decision};
+use nudge_core::plan::{Action, Counted, DISTURBANCE, Decision, ranked};
 use nudge_core::skill::{Parameter, SkillKind, Unit};
 use std::collections::BTreeSet;
 
@@ -25,18 +25,9 @@ pub fn used_views(record: &EpisodeRecord, step: usize) -> BTreeSet<ViewId> {
     used
 }
 
-/// What a candidate is worth, nats: `gain + gamma Reg`; `None` if it was rejected or not weighed.
-pub fn value(candidate: &CandidateRecord, gamma: f32) -> Option<f32> {
-    let value = candidate.gain? + gamma * candidate.reg.unwrap_or(0.0);
-    value.is_finite().then_some(value)
-}
-
-/// Positions in the order of falling values; what is no number comes last.
-fn falling(values: impl Iterator<Item = Option<f32>>) -> Vec<usize> {
-    let of = |value: Option<f32>| value.filter(|value| value.is_finite()).unwrap_or(f32::NEG_INFINITY);
-    let mut order: Vec<(usize, f32)> = values.map(of).enumerate().collect();
-    order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    order.into_iter().map(|(at, _)| at).collect()
+/// Views in the order of falling gain; what is no number comes last.
+fn falling(gains: &[f32]) -> Vec<usize> {
+    ranked(None, gains.iter().map(|gain| gain.is_finite().then_some(*gain)))
 }
 
 /// The best gain of all views, nats.
@@ -52,48 +43,16 @@ pub fn looked_from(decision: &Decision) -> Option<ViewId> {
     }
 }
 
-/// The candidate that a decision pushes.
-pub fn pushed(decision: &Decision) -> Option<usize> {
-    match decision.action {
-        Action::Look { .. } => None,
-        Action::Manipulate(done) => decision.candidates.iter().position(|candidate| candidate.manipulation == done),
-    }
-}
-
 /// The candidate that is looked at unless another one is chosen: the one that is pushed, else the best one.
 pub fn looked_at_first(decision: &Decision) -> Option<usize> {
-    pushed(decision).or(decision.best_push).filter(|at| *at < decision.candidates.len())
-}
-
-/// What a view's gain is, with the formula that applies.
-pub fn view_gain(counted: Counted) -> &'static str {
-    match counted {
-        Counted::All => {
-            "Information gain of the view, nats: IG(v) = Σ rays Σ voxels H(p)·Π(1 − p before), summed over rays"
-        }
-        Counted::Unseen => {
-            "Coverage of the view, nats: IG(v) = Σ voxels H(p)·max over rays Π(1 − p before); every voxel that no look has \
-             seen counts once, however many rays meet it"
-        }
-    }
-}
-
-/// What a push's gain is, with the formula that applies.
-pub fn push_gain(counted: Counted) -> &'static str {
-    match counted {
-        Counted::All => "Gain of the best single view under the predicted belief, nats: max over views of IG(v)",
-        Counted::Unseen => {
-            "What the push opens, nats: Σ voxels H(p predicted) that a ray of some view reaches after it and none before, of \
-             those that no look has seen"
-        }
-    }
+    decision.pushed().or(decision.best_push).filter(|at| *at < decision.candidates.len())
 }
 
 /// Columns of [`view_rows`].
 pub fn view_columns(counted: Counted) -> [Column; 5] {
     [
         Column { title: "View", hint: "Number of the view in its array", width: 34.0 },
-        Column { title: "Gain", hint: view_gain(counted), width: 52.0 },
+        Column { title: "Gain", hint: counted.of_a_view(), width: 52.0 },
         Column { title: "Of best", hint: "Share of the best view's gain", width: 46.0 },
         Column { title: "Camera at", hint: "Column, row and look-at target in the array, counted from 1", width: 62.0 },
         Column {
@@ -113,7 +72,7 @@ pub fn view_rows(
 ) -> Vec<Row> {
     let best = best_gain(decision);
     let looked = looked_from(decision);
-    let order = falling(decision.gains.iter().map(|gain| Some(*gain)));
+    let order = falling(&decision.gains);
     let row = |at: usize| {
         let (id, gain) = (ViewId(at as u16), decision.gains[at]);
         let note = match decision.pair.iter().position(|view| *view == id) {
@@ -167,26 +126,19 @@ fn numbers(decision: &Decision) -> Vec<(&'static str, &'static str)> {
 }
 
 /// Columns of [`push_rows`].
-pub fn push_columns(decision: &Decision, counted: Counted) -> Vec<Column> {
+pub fn push_columns(decision: &Decision) -> Vec<Column> {
     let mut columns = vec![
         Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
         Column { title: "Value", hint: "Gain + γ·Reg, nats: what is compared with looking", width: 50.0 },
-        Column { title: "Gain", hint: push_gain(counted), width: 50.0 },
+        Column { title: "Gain", hint: decision.counted().of_a_push(), width: 50.0 },
         Column { title: "γ·Reg", hint: DISTURBANCE, width: 42.0 },
     ];
     let width = |title: &str| if title == "mm" { 30.0 } else { 34.0 };
     columns.extend(numbers(decision).into_iter().map(|(title, hint)| Column { title, hint, width: width(title) }));
-    columns.push(Column {
-        title: "Note",
-        hint: "Whether it is chosen or the best, or why it was rejected",
-        width: 40.0,
-    });
+    let hint = "Whether it is chosen or the best, or why it was rejected";
+    columns.push(Column { title: "Note", hint, width: 40.0 });
     columns
 }
-
-/// What `γ·Reg` is.
-pub const DISTURBANCE: &str = "What the push makes uncertain of the classes, nats, at most 0: γ times Reg = min(0, H(classes now) − H(classes \
-     predicted)), H the entropy of the semantic map";
 
 /// Which candidates a table lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -197,12 +149,11 @@ pub enum Listed {
     All,
 }
 
-/// Push candidates of a decision, the best first.
-pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Option<usize>) -> Vec<Row> {
-    let pushed = pushed(decision);
+/// Push candidates of a decision, as the planner ranks them.
+pub fn push_rows(decision: &Decision, listed: Listed, selected: Option<usize>) -> Vec<Row> {
+    let pushed = decision.pushed();
     let candidates = &decision.candidates;
-    let mut order = falling(candidates.iter().map(|candidate| value(candidate, gamma)));
-    order.sort_by_key(|at| candidates[*at].rejection.is_some());
+    let mut order = decision.ranked_candidates();
     if listed == Listed::Best {
         order.retain(|at| candidates[*at].rejection.is_none());
         order.truncate(LISTED);
@@ -224,7 +175,7 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
             .first()
             .map_or_else(String::new, |fact| words::capital(&format!("{} {}", fact.name, fact.text.replace('-', "−"))));
         let view = candidate.view.map_or_else(String::new, |view| format!("; best seen from view {}", view.0));
-        let name = match (&candidate.rejection, value(candidate, gamma)) {
+        let name = match (&candidate.rejection, decision.value_of(candidate)) {
             (Some(rejection), _) => {
                 format!("{skill} {at}, rejected: {}", candidate.manipulation.against(rejection))
             }
@@ -233,9 +184,9 @@ pub fn push_rows(decision: &Decision, gamma: f32, listed: Listed, selected: Opti
         };
         let mut cells = vec![
             Cell::number(at),
-            Cell::nats(value(candidate, gamma)),
+            Cell::nats(decision.value_of(candidate)),
             Cell::nats(candidate.gain),
-            Cell::nats(candidate.reg.map(|reg| gamma * reg)),
+            Cell::nats(decision.disturbance_of(candidate)),
         ];
         cells.extend(columns.iter().map(|(title, _)| {
             match told.parameters.iter().find(|parameter| parameter.column == Some(*title)) {
@@ -268,41 +219,46 @@ fn figure(parameter: &Parameter) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::workbench::fixture;
+    use nudge_core::plan::CandidateRecord;
     use nudge_core::skill::Manipulation;
 
     #[test]
     fn candidates_of_two_skills_share_a_table_and_say_which_they_are() {
-        let mut decision = crate::fixture::play(1).record.steps[0].decision.clone();
-        let candidate = |json: &str, gain: f32| CandidateRecord {
-            gain: Some(gain),
+        let mut decision = fixture::session(1).moments[4].decision().expect("step 4").clone();
+        let candidate = |json: &str| CandidateRecord {
+            gain: Some(1.0),
             ..CandidateRecord::of(serde_json::from_str::<Manipulation>(json).expect("a manipulation"))
         };
         decision.candidates = vec![
-            candidate(r#"{"kind": "push", "start": [0, 0.1, 0.06], "direction_deg": 90, "length_m": 0.1}"#, 2.0),
+            candidate(r#"{"kind": "push", "start": [0, 0.1, 0.06], "direction_deg": 90, "length_m": 0.1}"#),
             candidate(
                 r#"{"kind": "drag", "start": [0, 0.2, 0.05], "direction_deg": -90, "length_m": 0.08, "pitch_deg": 45}"#,
-                1.0,
             ),
         ];
-        let titles: Vec<&str> = push_columns(&decision, Counted::All).iter().map(|column| column.title).collect();
+        decision.best_push = Some(0);
+        let titles: Vec<&str> = push_columns(&decision).iter().map(|column| column.title).collect();
         assert_eq!(titles, ["Push", "Value", "Gain", "γ·Reg", "To", "mm", "Down", "Note"]);
-        let rows = push_rows(&decision, 0.2, Listed::All, None);
+        let rows = push_rows(&decision, Listed::All, None);
         assert!(rows.iter().all(|row| row.cells.len() == titles.len()));
         assert!(rows[0].name.starts_with("Push 0, value") && rows[1].name.starts_with("Drag 1, value"));
         // With pushes alone the table is as it was.
         decision.candidates.truncate(1);
-        assert_eq!(push_columns(&decision, Counted::All).len(), 7);
+        assert_eq!(push_columns(&decision).len(), 7);
     }
 
     #[test]
-    fn a_gain_by_coverage_is_not_explained_as_a_sum_over_rays() {
-        let gain = |counted| view_columns(counted)[1].hint;
-        assert!(gain(Counted::All).contains("Σ rays Σ voxels"), "{}", gain(Counted::All));
-        let coverage = gain(Counted::Unseen);
-        assert!(coverage.contains("max over rays") && !coverage.contains("Σ rays"), "{coverage}");
-        let decision = crate::fixture::play(1).record.steps[0].decision.clone();
-        let push = |counted| push_columns(&decision, counted)[2].hint;
-        assert!(push(Counted::All).contains("best single view"), "{}", push(Counted::All));
-        assert!(push(Counted::Unseen).contains("opens") && !push(Counted::Unseen).contains("best single view"));
+    fn the_best_push_stands_on_top_of_the_table_though_another_one_has_a_larger_value() {
+        let mut decision = fixture::session(1).moments[4].decision().expect("step 4").clone();
+        let feasible: Vec<usize> =
+            (0..decision.candidates.len()).filter(|at| decision.candidates[*at].rejection.is_none()).collect();
+        let [.., other, best] = feasible[..] else { panic!("two feasible pushes") };
+        (decision.candidates[other].gain, decision.candidates[other].reg) = (Some(1e6), Some(0.0));
+        decision.best_push = Some(best);
+        for listed in [Listed::Best, Listed::All] {
+            let rows = push_rows(&decision, listed, None);
+            assert_eq!([rows[0].key, rows[1].key], [best, other]);
+        }
+        assert_eq!(push_rows(&decision, Listed::All, None).len(), decision.candidates.len());
     }
 }

@@ -11,6 +11,7 @@ use crate::workbench::command::Command;
 use crate::workbench::model::{Model, Picked};
 use crate::workbench::session::{Moment, Session};
 use nudge_core::belief::{bernoulli_entropy, beta_mean, beta_variance, dirichlet_entropy, dirichlet_vacuity};
+use nudge_core::episode::NO_TRUTH;
 use nudge_core::grid::Grid;
 use nudge_core::scene::ClassId;
 use nudge_core::score::SCORED_HEIGHT_M;
@@ -126,10 +127,10 @@ impl About<'_> {
 
     /// What is really in a voxel.
     fn really(&self, voxel: usize) -> &'static str {
-        match self.moment.truth.occupancy.get(voxel) {
+        match self.moment.truth.as_ref().and_then(|truth| truth.occupancy.get(voxel)) {
             Some(1) => "occupied",
             Some(_) => "free",
-            None => "n/a",
+            None => NO_TRUTH,
         }
     }
 
@@ -141,8 +142,8 @@ impl About<'_> {
     }
 
     fn true_class(&self) -> String {
-        let label = self.moment.truth.labels.get(self.cell);
-        label.map_or("n/a".to_owned(), |label| colors::class_title(&self.session.setup.catalog, ClassId(*label)))
+        let label = self.moment.truth.as_ref().and_then(|truth| truth.labels.get(self.cell));
+        label.map_or(NO_TRUTH.to_owned(), |label| colors::class_title(&self.session.setup.catalog, ClassId(*label)))
     }
 
     fn history(&self, ui: &mut Ui, ask: &mut Vec<Command>) {
@@ -229,7 +230,7 @@ impl About<'_> {
                     pos2(plot.left() + share * plot.width(), bottom),
                 );
                 painter.rect_filled(bar, 0.0, legend::ink(Colormap::Viridis.rgb(p)));
-                if self.moment.truth.occupancy.get(first + level) == Some(&1) {
+                if self.moment.truth.as_ref().is_some_and(|truth| truth.occupancy.get(first + level) == Some(&1)) {
                     let mark =
                         Rect::from_min_max(pos2(plot.right() + 3.0, bottom - each), pos2(plot.right() + 8.0, bottom));
                     painter.rect_filled(mark, 0.0, ui.visuals().strong_text_color());
@@ -253,7 +254,7 @@ impl About<'_> {
             painter.text(pos2(plot.left(), y), Align2::LEFT_BOTTOM, "0", font.clone(), ink);
             painter.text(pos2(plot.right(), y), Align2::RIGHT_BOTTOM, "1", font, ink);
         }
-        if let Some([_, up]) = super::arrows(ui, &response) {
+        if let Some([_, up]) = super::arrow_keys(ui, &response) {
             let now = self.voxel().map_or(0, |voxel| voxel - first) as i32;
             let level = (now + up).clamp(0, levels as i32 - 1) as usize;
             ask.push(Command::Pick(Some(Picked::Voxel(first + level))));
@@ -263,21 +264,25 @@ impl About<'_> {
             let truth = self.really(voxel);
             let p = words::probability(beta_mean(self.moment.belief.voxel(voxel)));
             let z = self.grid.center(self.grid.voxel(voxel)).z;
-            let text = format!("z {z:.3} m: occupied {p}, really {truth}");
+            let really = if self.moment.truth.is_some() { format!(", really {truth}") } else { String::new() };
+            let text = format!("z {z:.3} m: occupied {p}{really}");
             Tooltip::for_widget(&response).at_pointer().gap(12.0).show(|ui| ui.label(text));
             if response.clicked() {
                 ask.push(Command::Pick(Some(Picked::Voxel(voxel))));
             }
         }
         let hint = "Voxels whose centre is inside an object";
-        ui.label(RichText::new("black or white mark: really occupied").small().weak()).on_hover_text(hint);
+        if self.moment.truth.is_some() {
+            ui.label(RichText::new("black or white mark: really occupied").small().weak()).on_hover_text(hint);
+        }
     }
 
     fn classes(&self, ui: &mut Ui) {
         heading(ui, "Class of the floor cell", "Class probabilities a_k / Σ a of the cell's Dirichlet, 0 to 1");
         let (a, catalog) = (self.moment.belief.cell(self.cell), &self.session.setup.catalog);
         let sum: f32 = a.iter().sum();
-        let truth = self.moment.truth.labels.get(self.cell).map(|label| ClassId(*label));
+        let labels = self.moment.truth.as_ref().map(|truth| &truth.labels);
+        let truth = labels.and_then(|labels| labels.get(self.cell)).map(|label| ClassId(*label));
         for (k, a) in a.iter().enumerate() {
             let class = ClassId(k as u8);
             let name = colors::class_title(catalog, class);
@@ -293,7 +298,7 @@ impl About<'_> {
                 .on_hover_text(format!("Dirichlet parameter {}", words::significant(f64::from(*a), 3)));
         }
         let unknown = words::probability(dirichlet_vacuity(&self.moment.belief.cell(self.cell)));
-        ui.label(RichText::new(format!("unknown share {unknown}; truth: {}", self.true_class())).small())
-            .on_hover_text(UNKNOWN_SHARE);
+        let truth = if labels.is_some() { format!("; truth: {}", self.true_class()) } else { String::new() };
+        ui.label(RichText::new(format!("unknown share {unknown}{truth}")).small()).on_hover_text(UNKNOWN_SHARE);
     }
 }

@@ -1,8 +1,8 @@
 //! Dialogs and toasts.
 
-use crate::workbench::app::Part;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::{Dialog, Reply};
+use crate::workbench::part::Part;
 use crate::workbench::session::SessionId;
 use crate::workbench::tasks::Task;
 use crate::workbench::toasts::Toasts;

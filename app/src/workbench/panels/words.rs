@@ -1,6 +1,6 @@
 //! Numbers and short sentences as the panels write them: with units, and two or three significant digits.
 
-pub(crate) use crate::record::decision::{action, capital, reason, thousands};
+pub(crate) use crate::record::decision::{action, capital, thousands};
 
 use nudge_core::grid::{Cell, Grid, Voxel};
 use re_viewer::external::egui::{RichText, TextStyle};

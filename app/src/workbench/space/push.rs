@@ -1,7 +1,7 @@
 //! Pushes in three dimensions: the candidates, and of the one that is looked at what is predicted and what really happened.
 
 use super::voxels::Voxels;
-use super::{Painter, Side, Space, at};
+use super::{Painter, Side, Space, at, no_arrows};
 use crate::colors;
 use crate::record::shapes;
 use crate::record::voxels::{colored, surface};
@@ -10,6 +10,7 @@ use crate::workbench::session::Moment;
 use nudge_core::plan::Action;
 use nudge_core::scene::ClassId;
 use nudge_core::skill::Manipulation;
+use nudge_core::world::TruthMap;
 use std::sync::Arc;
 
 impl Painter {
@@ -48,8 +49,7 @@ impl Painter {
             format!("{:?} {looked_at:?} {:?}", side.key(), asked.map(|asked| asked.manipulation)),
         ) {
             let swept = asked.map(|preview| &*preview.swept);
-            let swept =
-                swept.or_else(|| led_here.and_then(|outcome| outcome.intervention.as_ref()).map(|told| &told.swept));
+            let swept = swept.or_else(|| led_here.and_then(|outcome| outcome.swept.as_ref()).map(|told| &told.swept));
             let swept = swept.map_or_else(Vec::new, |swept| {
                 let mut inside = vec![false; grid.voxel_count()];
                 swept.iter().for_each(|index| inside[index] = true);
@@ -73,7 +73,7 @@ impl Painter {
                     self.log_voxels(at::DIFFERENCE, &grid, Vec::new(), |_| [0; 3]);
                 }
                 Some((before, after)) => {
-                    let truth = &side.moment.truth;
+                    let truth = side.moment.truth.as_deref();
                     let plain = Display::default();
                     let (voxels, rgb) =
                         Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
@@ -88,12 +88,13 @@ impl Painter {
         let happened = happened(side, looked_at);
         let note = if happened.is_some() { "" } else { note(side, looked_at) };
         if self.differs(at::HAPPENED, format!("{:?} {:?} {note}", side.key(), happened.map(|moment| moment.step))) {
-            let truth = happened.map_or(&side.moment.truth, |happened| &happened.truth);
-            let inside: Vec<bool> = truth.occupancy.iter().map(|o| *o == 1).collect();
-            let voxels = if happened.is_some() { surface(&grid, &inside) } else { Vec::new() };
+            let truth = happened.and_then(|happened| happened.truth.as_deref());
+            let inside = |truth: &TruthMap| truth.occupancy.iter().map(|o| *o == 1).collect::<Vec<bool>>();
+            let voxels = truth.map_or_else(Vec::new, |truth| surface(&grid, &inside(truth)));
             let catalog = &side.setup.catalog;
             self.log_voxels(at::HAPPENED, &grid, voxels, |index| {
-                colors::of_class(catalog, ClassId(truth.labels[index / grid.dims[2]]))
+                let label = truth.and_then(|truth| truth.labels.get(index / grid.dims[2]));
+                label.map_or(colors::UNKNOWN_RGB, |label| colors::of_class(catalog, ClassId(*label)))
             });
             let [_, depth, height] = side.shelf.size;
             self.log(at::HAPPENED_NOTE, &shapes::words([0.0, 0.5 * depth, 0.5 * height], note));
@@ -101,13 +102,9 @@ impl Painter {
     }
 }
 
-pub(super) fn no_arrows() -> rerun::Arrows3D {
-    rerun::Arrows3D::from_vectors(Vec::<[f32; 3]>::new())
-}
-
 /// The candidates as arrows, in the colours of what they are worth by the episode's own weight of the disturbance.
 fn candidates(side: &Side) -> rerun::Arrows3D {
-    side.decision.as_ref().map_or_else(no_arrows, |decision| shapes::candidates(decision, side.gamma))
+    side.decision.as_ref().map_or_else(no_arrows, |decision| shapes::candidates(decision))
 }
 
 /// The manipulation that a moment's step did.
@@ -155,16 +152,19 @@ mod tests {
     #[test]
     fn push_arrows_have_the_colours_of_the_episodes_own_gamma() {
         let mut session = fixture::session(1);
-        session.record.config.planner.gamma = 3.0;
         let mut decision = session.moments[4].decision().expect("step 4").clone();
         // Two that are weighed the other way round by another weight.
         for (candidate, (gain, reg)) in decision.candidates.iter_mut().zip([(100.0, -60.0), (50.0, 0.0)]) {
             (candidate.gain, candidate.reg, candidate.rejection) = (Some(gain), Some(reg), None);
         }
-        session.pending = Some(Arc::new(decision.clone()));
-        let side = Side::of(&session, session.steps());
-        assert_ne!(shapes::candidates(&decision, 3.0), shapes::candidates(&decision, GAMMA), "the weight matters here");
-        assert_eq!(candidates(&side), shapes::candidates(&decision, 3.0));
+        let mut by = |gamma: f32| {
+            decision.rule.as_mut().expect("of an episode").settings.gamma = gamma;
+            decision.clone()
+        };
+        let (own, other) = (by(3.0), by(GAMMA));
+        assert_ne!(shapes::candidates(&own), shapes::candidates(&other), "the weight matters here");
+        session.pending = Some(Arc::new(own.clone()));
+        assert_eq!(candidates(&Side::of(&session, session.steps())), shapes::candidates(&own));
     }
 
     #[test]

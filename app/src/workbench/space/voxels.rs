@@ -1,6 +1,5 @@
 //! Which voxels of a belief are drawn, and in which colours.
 
-use super::CHANGED;
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture;
 use crate::record::voxels::surface;
@@ -10,6 +9,9 @@ use nudge_core::grid::Cell;
 use nudge_core::scene::{BACKGROUND, Catalog};
 use nudge_core::world::TruthMap;
 
+/// Probability changes smaller than this are not drawn.
+const CHANGED: f32 = 0.05;
+
 /// What of the display decides about the belief's voxels.
 pub(super) fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [[f32; 2]; 3]) {
     (display.colour_by, display.band, display.slice_m)
@@ -18,7 +20,8 @@ pub(super) fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [[f32; 2]; 3]
 /// A belief with what colours need.
 pub(super) struct Voxels<'a> {
     pub belief: &'a Belief,
-    pub truth: &'a TruthMap,
+    /// What is, if that is known; without it nothing is an error.
+    pub truth: Option<&'a TruthMap>,
     pub catalog: &'a Catalog,
 }
 
@@ -37,10 +40,11 @@ impl<'a> Voxels<'a> {
             [first, ((high - 0.5).floor().max(first as f32) as usize).min(grid.dims[axis] - 1)]
         });
         let in_band = |p: f32| p >= least && p <= most && (p > 0.5 || least < 0.5);
+        let is_there = move |index: usize| truth.map(|truth| truth.occupancy[index] == 1);
         let changed = |index: usize| before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
         let shows = |index: usize| match display.colour_by {
             ColourBy::Change => changed(index).abs() >= CHANGED,
-            ColourBy::Error => belief.probability(index) > 0.5 || truth.occupancy[index] == 1,
+            ColourBy::Error => belief.probability(index) > 0.5 || is_there(index) == Some(true),
             _ => in_band(belief.probability(index)),
         };
         let mut voxels = vec![false; grid.voxel_count()];
@@ -64,13 +68,11 @@ impl<'a> Voxels<'a> {
                 None | Some(BACKGROUND) => colors::UNKNOWN_RGB,
                 Some(class) => colors::of_class(catalog, class),
             }),
-            ColourBy::Error => {
-                Box::new(move |index| match (belief.probability(index) > 0.5, truth.occupancy[index] == 1) {
-                    (true, false) => colors::HALLUCINATED_RGB,
-                    (false, true) => colors::MISSED_RGB,
-                    _ => [226, 228, 232],
-                })
-            }
+            ColourBy::Error => Box::new(move |index| match (belief.probability(index) > 0.5, is_there(index)) {
+                (true, Some(false)) => colors::HALLUCINATED_RGB,
+                (false, Some(true)) => colors::MISSED_RGB,
+                _ => [226, 228, 232],
+            }),
             ColourBy::Change => Box::new(move |index| {
                 let change = before.map_or(0.0, |before| belief.probability(index) - before.probability(index));
                 Colormap::Diverging.of(change, [-1.0, 1.0])

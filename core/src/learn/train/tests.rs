@@ -209,6 +209,17 @@ fn a_network_overfits_four_scenes() {
 }
 
 #[test]
+fn a_card_of_a_far_too_wide_network_asked_for_gigabytes() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("sigma_o.safetensors");
+    let few = [("a".to_owned(), tch::Tensor::from_slice(&[1.0_f32; 8]))];
+    crate::cnabu::write_tensors(&path, &few).expect("written");
+    Card::new("sigma_o", 512, 8).write(&path).expect("written");
+    let line = Cnabu::load_file(&path).expect_err("refuses").to_string();
+    assert!(line.ends_with("sigma_o.toml: width: is 512, but the weights are 8 numbers, too few for that"), "{line}");
+}
+
+#[test]
 fn weights_go_to_a_file_and_come_back_and_bad_ones_are_told() {
     let (directory, data) = data(1);
     let trainer = trainer(small(), &data);

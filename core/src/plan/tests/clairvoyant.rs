@@ -17,6 +17,7 @@ fn the_clairvoyant_pushes_what_really_wins_objects_and_of_equals_what_opens_most
     assert_eq!((decision.best_push, decision.reason), (Some(at), Reason::PushReveals));
     assert_eq!(decision.action, Action::Manipulate(decision.candidates[at].manipulation));
     assert!(decision.motion.is_some() && (decision.igm - 4.0 * std::f32::consts::LN_2).abs() < 1e-5);
+    assert!(decision.comparison().term(TermKind::Push).is_some_and(|term| term.words.contains("really opens")));
     // What the planner promised of each is kept, and is that of `mem`.
     assert_eq!(
         table.decide(PolicyKind::Mem).candidates.iter().map(|c| c.reg).collect::<Vec<_>>(),

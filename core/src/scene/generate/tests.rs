@@ -144,3 +144,48 @@ fn senseless_wishes_are_refused() {
     assert!(refused(GenerateConfig { classes: vec![BACKGROUND], ..base() }).starts_with("class 14"));
     assert!(refused(GenerateConfig { shelf: Shelf::new([9.0, 0.4, 0.4]), ..base() }).contains("shelf size 9 m"));
 }
+
+#[test]
+fn shelves_of_every_family_are_sound_stand_still_and_repeat() {
+    let catalog = Catalog::standard();
+    for family in Family::ALL {
+        let config = GenerateConfig::of_family(family);
+        let mut different = 0;
+        for seed in 0..6 {
+            let scene = generate(&catalog, &config, seed).expect("scene");
+            assert_eq!(scene.check(&catalog).expect("sound"), Vec::<String>::new(), "{family} {seed}");
+            let fill = scene.fill(&catalog).expect("fill");
+            let [low, high] = family.fill();
+            assert!((low - 0.03..high + 0.08).contains(&fill), "{family} {seed}: {fill}");
+            assert_eq!(generate(&catalog, &config, seed).expect("again"), scene);
+            different += usize::from(generate(&catalog, &config, seed + 100).expect("other").objects != scene.objects);
+            let mut world = crate::world::World::new(scene.shelf, scene.bodies(&catalog).expect("bodies"));
+            let moved = world.settle();
+            assert!(moved < 0.005, "{family} {seed}: {moved} m");
+            assert_eq!(world.bodies().len(), scene.objects.len());
+        }
+        assert_eq!(different, 6, "{family}");
+    }
+}
+
+#[test]
+fn a_structure_keeps_to_listed_classes_and_clear_of_kept_objects() {
+    let catalog = Catalog::standard();
+    let keep = vec![Object::new("cereal_box", [0.0, 0.2], 30.0)];
+    for family in Family::ALL {
+        let classes = vec![ClassId(0), ClassId(3)];
+        let config = GenerateConfig { classes, keep: keep.clone(), ..GenerateConfig::of_family(family) };
+        let scene = generate(&catalog, &config, 1).expect("scene");
+        scene.check(&catalog).expect("sound");
+        assert_eq!(scene.objects[0], keep[0]);
+        assert!(scene.objects.len() > 3);
+        assert!(scene.objects[1..].iter().all(|object| ["chips_can", "gum_tin"].contains(&object.class.as_str())));
+    }
+}
+
+#[test]
+fn families_are_read_by_their_names() {
+    assert!(Family::ALL.into_iter().all(|family| family.to_string().parse() == Ok(family)));
+    let error = "wall".parse::<Family>().expect_err("unknown");
+    assert!(error.contains("\"wall\"") && error.contains("tall-first") && !error.contains('\n'), "{error}");
+}

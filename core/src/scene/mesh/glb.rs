@@ -3,7 +3,7 @@
 //! The document is read by `gltf`, the numbers here: its reader takes every position for a float and every index for a
 //! whole number, whatever the file says, and quantised meshes (`KHR_mesh_quantization`) are common.
 
-use super::read::{Corner, Group, MAX_TRIANGLES};
+use super::group::{Corner, Group, MAX_TRIANGLES};
 use gltf::accessor::{Accessor, DataType, Dimensions};
 use gltf::buffer::{Data, View};
 use gltf::json::Value;

@@ -4,7 +4,7 @@
 //! over do so because of the rest: colours behind the corners, materials without a name, comments. Every fault is told
 //! with its line.
 
-use super::read::{Corner, Group, MAX_TRIANGLES, too_many};
+use super::group::{Corner, Group, MAX_TRIANGLES, too_many};
 use super::text::{lines, number};
 use std::collections::HashMap;
 

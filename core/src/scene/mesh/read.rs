@@ -1,36 +1,13 @@
 //! Reading triangles from OBJ, STL and GLB files.
 
+use super::group::{Group, MAX_TRIANGLES, too_many};
 use super::{glb, obj, stl};
 use crate::wall::guarded;
 use crate::{Error, Result};
 use std::path::Path;
 
-/// Meshes with more triangles are refused.
-pub const MAX_TRIANGLES: usize = 200_000;
 /// Files larger than this, bytes, are refused unread.
 const MAX_BYTES: u64 = 256 << 20;
-
-/// A corner as the file has it: in its unit, z up. Double precision, since a mesh may lie far from its origin.
-pub type Corner = nalgebra::Point3<f64>;
-
-/// Triangles that a file keeps together: an object or group of an OBJ, a solid of an STL, a primitive of a GLB.
-#[derive(Clone, Debug, Default)]
-pub struct Group {
-    /// Corners.
-    pub points: Vec<Corner>,
-    /// Corners of each triangle, by position in `points`.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-/// The smallest and the largest coordinates of all corners that a triangle uses.
-pub fn bounds(groups: &[Group]) -> Option<[Corner; 2]> {
-    let corners =
-        groups.iter().flat_map(|group| group.triangles.iter().flatten().map(move |i| group.points[*i as usize]));
-    corners.fold(None, |bounds: Option<[Corner; 2]>, point| {
-        let [low, high] = bounds.unwrap_or([point; 2]);
-        Some([low.inf(&point), high.sup(&point)])
-    })
-}
 
 /// Reads the groups of a mesh file; the file's name tells the format.
 pub fn read(path: &Path) -> Result<Vec<Group>> {
@@ -69,9 +46,4 @@ pub fn read(path: &Path) -> Result<Vec<Group>> {
         }
     }
     Ok(groups)
-}
-
-/// What to say of a mesh with this many triangles.
-pub fn too_many(count: usize) -> String {
-    format!("{count} triangles; the limit is {MAX_TRIANGLES} (simplify the mesh)")
 }

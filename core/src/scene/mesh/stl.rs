@@ -3,7 +3,7 @@
 //! A reader of our own: the format is a list of triples, and `stl_io` takes the first of several solids for the whole
 //! file, wants finite normals and UTF-8 names, and tells no line.
 
-use super::read::{Corner, Group, MAX_TRIANGLES, too_many};
+use super::group::{Corner, Group, MAX_TRIANGLES, too_many};
 use super::text::{lines, number, without_mark};
 
 /// Length of a binary file's head: 80 bytes that say nothing, and the number of triangles.

@@ -1,51 +1,21 @@
 //! The board from above: the front edge, the robot's side, is at the bottom.
 
+mod board;
 mod draw;
 
-use super::{Carried, choice};
+use super::common::{Carried, choice, colour};
 use crate::workbench::author::{Author, Choose, Gesture, Snap, name};
+use board::{Board, is_hidden};
 use draw::Ink;
-use nudge_core::scene::{Shelf, outline};
+use nudge_core::scene::outline;
 use re_viewer::external::egui::{self, CursorIcon, Pos2, Rect, Sense, Vec2, WidgetInfo, WidgetType};
 
-/// Room around the board for its scale, points.
-const MARGIN: Vec2 = Vec2::new(44.0, 40.0);
 /// From an object's outline to the middle of its handle, points.
 const HANDLE_AWAY: f32 = 24.0;
 const HANDLE_RADIUS: f32 = 7.0;
 /// Arrow keys move what is chosen, not the focus.
 const ARROWS: egui::EventFilter =
     egui::EventFilter { tab: false, horizontal_arrows: true, vertical_arrows: true, escape: true };
-
-/// Where the board is on the screen.
-#[derive(Clone, Copy)]
-struct Board {
-    /// Its front edge at the bottom.
-    rect: Rect,
-    /// Points per metre.
-    scale: f32,
-}
-
-impl Board {
-    fn fitting(shelf: &Shelf, space: Rect) -> Self {
-        let [width, depth, _] = shelf.size;
-        let room = (space.size() - 2.0 * MARGIN).max(Vec2::splat(20.0));
-        let scale = (room.x / width).min(room.y / depth);
-        Self { rect: Rect::from_center_size(space.center(), Vec2::new(width, depth) * scale), scale }
-    }
-
-    fn screen(&self, [x, y]: [f32; 2]) -> Pos2 {
-        Pos2::new(self.rect.center().x + x * self.scale, self.rect.bottom() - y * self.scale)
-    }
-
-    fn board(&self, at: Pos2) -> [f32; 2] {
-        [(at.x - self.rect.center().x) / self.scale, (self.rect.bottom() - at.y) / self.scale]
-    }
-
-    fn points(&self, outline: &[[f32; 2]]) -> Vec<Pos2> {
-        outline.iter().map(|point| self.screen(*point)).collect()
-    }
-}
 
 /// Draws the board in what is left of `ui`, and carries out what the pointer does there. Returns whether the keyboard's
 /// focus is on the board.
@@ -120,10 +90,6 @@ fn describe(author: &Author, at: usize) -> String {
         words += problem;
     }
     words
-}
-
-fn is_hidden(author: &Author, at: usize) -> bool {
-    author.hidden().objects.as_ref().is_some_and(|hidden| hidden.contains(&at))
 }
 
 /// The handle that turns the one chosen object.
@@ -202,7 +168,7 @@ fn ghost(painter: &egui::Painter, ink: &Ink, author: &Author, board: &Board, car
     let points = board.points(&outline::placed(&class.footprint, position, 0.0));
     // Also over the palette, from where it is carried.
     let painter = painter.with_clip_rect(painter.ctx().content_rect());
-    draw::ghost(&painter, ink, points, super::colour(class.color));
+    draw::ghost(&painter, ink, points, colour(class.color));
 }
 
 /// What the pointer is at, in numbers.

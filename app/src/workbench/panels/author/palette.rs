@@ -1,6 +1,6 @@
 //! The classes: a click adds one where there is room, a drag puts it where it is let go.
 
-use super::{Carried, colour};
+use super::common::{Carried, colour};
 use crate::colors;
 use crate::workbench::author::Author;
 use re_viewer::external::egui::{self, Align2, Sense, TextStyle, WidgetInfo, WidgetType};

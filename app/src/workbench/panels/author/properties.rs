@@ -1,6 +1,6 @@
 //! What is chosen, how much is hidden, what is wrong, and what fills the rest.
 
-use super::{colour, named};
+use super::common::{colour, named};
 use crate::colors;
 use crate::workbench::author::{Author, Choose, Edit, name, normal_angle, rounded};
 use nudge_core::scene::Object;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::workbench::author::Snap;
+use crate::workbench::author::{Choose, Snap};
 use crate::workbench::panels::photo;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};

@@ -1,6 +1,6 @@
 //! What can be done to the scene and to what is chosen in it.
 
-use super::{DELETE, DUPLICATE, REDO, ROTATE, SAVE, UNDO, named};
+use super::common::{DELETE, DUPLICATE, REDO, ROTATE, SAVE, UNDO, named};
 use crate::workbench::author::{Author, Snap};
 use crate::workbench::command::{Command, MenuCommand};
 use re_viewer::external::egui::{self, KeyboardShortcut};

@@ -71,8 +71,8 @@ fn an_overruled_verdict_is_marked_and_counted() {
         .and_then(|moment| moment.outcome.clone())
         .expect("a step")
         .record
-        .objects
-        .clone();
+        .objects()
+        .to_vec();
     let wrong = objects.iter().find(|object| object.verdict != Verdict::Found).expect("one that was not found");
     let found = objects.iter().filter(|object| object.verdict == Verdict::Found).count();
     assert!(has(&harness, &format!("{found}\u{a0}found")));
@@ -99,7 +99,7 @@ fn the_prior_has_a_note_and_no_verdicts() {
 fn pictures() {
     let mut model = fixture::model();
     let session = &mut model.sessions[0];
-    let objects = session.moments[5].outcome.as_ref().expect("a step").record.objects.clone();
+    let objects = session.moments[5].outcome.as_ref().expect("a step").record.objects().to_vec();
     session.annotations.notes.insert(0, "Nothing is known yet.".to_owned());
     session.annotations.notes.insert(5, "The push uncovered the tin; the box is still a guess.".to_owned());
     session.annotations.verdicts.entry(5).or_default().insert(object_name(&objects[0]), Verdict::Found);

@@ -1,10 +1,10 @@
 //! Pictures of the panels, for a person to look at: `cargo test ... panels -- --ignored pictures`, into the directory
 //! that `NUDGE_PICTURES` names.
 
-use super::{Show, Stage};
+use super::Stage;
 use crate::workbench::fixture::{self, Script};
 use crate::workbench::model::{LayoutKind, Model, Picked};
-use crate::workbench::panels::{self, camera, compare, curves, decision, episode, gains, maps, push, weighed, why};
+use crate::workbench::panels::{Panel, camera, compare, curves, decision, episode, gains, maps, push, why};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use nudge_core::camera::ViewId;
@@ -44,25 +44,25 @@ fn pictures() {
     let out =
         std::env::var_os("NUDGE_PICTURES").map_or_else(|| std::env::temp_dir().join("nudge-panels"), PathBuf::from);
     std::fs::create_dir_all(&out).expect("directory");
-    let shots: [(&str, Show, [f32; 2], usize); 11] = [
-        ("maps", maps::show, [520.0, 640.0], 8),
-        ("camera", camera::show, [520.0, 260.0], 8),
-        ("curves", curves::show, [900.0, 190.0], 7),
-        ("decision", decision::show, [330.0, 860.0], 5),
-        ("why-voxel", why::show, [460.0, 860.0], 8),
-        ("why-cell", why::show, [460.0, 860.0], 8),
-        ("gains", gains::show, [560.0, 640.0], 5),
-        ("push", push::show, [620.0, 1150.0], 5),
-        ("push-done", push::show, [620.0, 900.0], 6),
-        ("compare", compare::show, [900.0, 640.0], 8),
-        ("new-episode", episode::show, [236.0, 900.0], 8),
+    let shots: [(&str, fn() -> Box<dyn Panel>, [f32; 2], usize); 11] = [
+        ("maps", || Box::new(maps::State::default()), [520.0, 640.0], 8),
+        ("camera", || Box::new(camera::State::default()), [520.0, 260.0], 8),
+        ("curves", || Box::new(curves::show), [900.0, 190.0], 7),
+        ("decision", || Box::new(decision::State::default()), [330.0, 860.0], 5),
+        ("why-voxel", || Box::new(why::show), [460.0, 860.0], 8),
+        ("why-cell", || Box::new(why::show), [460.0, 860.0], 8),
+        ("gains", || Box::new(gains::State::default()), [560.0, 640.0], 5),
+        ("push", || Box::new(push::State::default()), [620.0, 1150.0], 5),
+        ("push-done", || Box::new(push::State::default()), [620.0, 900.0], 6),
+        ("compare", || Box::new(compare::State::default()), [900.0, 640.0], 8),
+        ("new-episode", || Box::new(episode::show), [236.0, 900.0], 8),
     ];
     let only = std::env::var("NUDGE_ONLY").unwrap_or_default();
     let mut model = crowded();
-    for (name, show, size, cursor) in shots.into_iter().filter(|(name, ..)| name.contains(&only)) {
+    for (name, panel, size, cursor) in shots.into_iter().filter(|(name, ..)| name.contains(&only)) {
         for theme in [egui::Theme::Dark, egui::Theme::Light] {
             prepare(&mut model, name, cursor);
-            let stage = Stage { model, asked: Vec::new(), show };
+            let stage = Stage { model, asked: Vec::new(), panel: panel() };
             let mut styled = 0;
             let mut spent = Vec::new();
             let draw = |ui: &mut egui::Ui, stage: &mut Stage| {
@@ -73,7 +73,7 @@ fn pictures() {
                 styled += 1;
                 let started = Instant::now();
                 egui::Frame::central_panel(ui.style()).inner_margin(8).show(ui, |ui| {
-                    (stage.show)(ui, &mut stage.model, &mut stage.asked);
+                    stage.panel.show(ui, &mut stage.model, &mut stage.asked);
                 });
                 spent.push(started.elapsed().as_secs_f64() * 1e3);
             };
@@ -90,7 +90,6 @@ fn pictures() {
             harness.render().expect("rendered").save(out.join(format!("{name}-{theme}.png"))).expect("written");
             let stage = harness.into_state();
             model = stage.model;
-            model.panels = panels::State::default();
             let steady = spent.iter().skip(4).copied().fold(f64::INFINITY, f64::min);
             println!(
                 "{name} {theme}: first {:.2} ms, then {steady:.2} ms a frame",
@@ -105,7 +104,7 @@ fn prepare(model: &mut Model, name: &str, cursor: usize) {
     model.cursor = cursor;
     model.kept.layout = if name == "compare" { LayoutKind::Compare } else { LayoutKind::Episode };
     let session = &model.sessions[0];
-    let swept = session.moments[6].outcome.as_ref().and_then(|outcome| outcome.intervention.as_ref());
+    let swept = session.moments[6].outcome.as_ref().and_then(|outcome| outcome.swept.as_ref());
     let middle = swept.and_then(|swept| swept.swept.iter().nth(swept.swept.len() * 3 / 4));
     let height = session.moments[0].belief.grid().dims[2];
     model.picked = match (name, middle) {
@@ -115,6 +114,6 @@ fn prepare(model: &mut Model, name: &str, cursor: usize) {
     };
     let decision = session.decision_after(cursor);
     model.view = decision.and_then(|decision| decision.pair.first().copied()).or(Some(ViewId(140)));
-    model.candidate = decision.and_then(|decision| weighed::pushed(decision).or(decision.best_push));
+    model.candidate = decision.and_then(|decision| decision.pushed().or(decision.best_push));
     fixture::answer(model);
 }

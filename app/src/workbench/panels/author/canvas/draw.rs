@@ -1,8 +1,8 @@
 //! How the board and what stands on it look.
 
-use super::super::colour;
-use super::Board;
+use super::board::{Board, is_hidden};
 use crate::workbench::author::{Author, Gesture};
+use crate::workbench::panels::author::common::colour;
 use crate::workbench::theme::LEAST_SIZE;
 use nudge_core::scene::Shelf;
 use re_viewer::external::egui::{
@@ -102,8 +102,8 @@ pub(super) fn objects(painter: &Painter, ink: &Ink, board: &Board, author: &Auth
         }
         let class = author.catalog().by_name(&author.scene().objects[at].class);
         let fill = class.map_or(Color32::GRAY, |class| colour(class.color));
-        let is_hidden = super::is_hidden(author, at) && !author.hidden().is_stale
-            || super::is_hidden(author, at) && author.gesture().is_some();
+        let is_hidden =
+            is_hidden(author, at) && !author.hidden().is_stale || is_hidden(author, at) && author.gesture().is_some();
         let edge = if ink.is_dark { Color32::from_black_alpha(150) } else { Color32::from_black_alpha(90) };
         painter.add(Shape::convex_polygon(points.clone(), fill, Stroke::new(1.0, edge)));
         if hovered == Some(at) && author.gesture().is_none() {

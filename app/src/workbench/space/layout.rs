@@ -1,17 +1,17 @@
 //! Which three-dimensional views every layout has.
 
-use super::model::LayoutKind;
-use super::space::at;
+use super::at;
 use crate::record::blueprint::{Layout, Part};
 use crate::record::eye::Eye;
 use crate::record::layout::{Ground, spatial};
+use crate::workbench::model::LayoutKind;
 
 /// Width over height from which on a view shows the whole shelf with the eye beside the robot.
 const WHOLE_SHELF: f32 = 1.05;
 
 /// Width over height in coarse steps, rounded down, so that a window that is made a little wider leaves the eye where a
 /// person has turned it.
-pub(crate) fn coarse(aspect: f32) -> f32 {
+pub(super) fn coarse(aspect: f32) -> f32 {
     const STEP: f32 = 1.1;
     STEP.powf((aspect.clamp(0.2, 8.0).ln() / STEP.ln()).floor())
 }
@@ -19,7 +19,7 @@ pub(crate) fn coarse(aspect: f32) -> f32 {
 /// The views of a layout with the first layout that has the same ones; `None` where it has none. `aspect` is width over
 /// height of the place for all of them together, `size` the shelf's, metres. With the robot in them they are seen from
 /// beside it, or it would stand in the way.
-pub(crate) fn of(
+pub(super) fn of(
     layout: LayoutKind,
     aspect: f32,
     size: [f32; 3],

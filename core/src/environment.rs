@@ -1,0 +1,43 @@
+//! Where images come from and pushes go: a simulated shelf, a recording, a robot.
+//!
+//! An [`Episode`](crate::episode::Episode) knows its surroundings only through [`Environment`]. It asks for a frame from a
+//! view, has a motion carried out and is told what happened; if the surroundings know the truth, it is scored. Whatever can
+//! do the first two runs every policy but those that know what would happen ([`Environment::simulated`]).
+
+mod simulated;
+
+pub use simulated::Simulated;
+
+use crate::Result;
+use crate::arm::{Arm, PhasedMotion};
+use crate::camera::{Intrinsics, Sensed, View};
+use crate::world::{ManipulationOutcome, TruthMap};
+
+/// What an episode maps.
+pub trait Environment: Send + Sync {
+    /// What the camera gives from a view, as it is: without the noise of [`NoiseModel`](crate::camera::NoiseModel).
+    ///
+    /// The camera asked for is `intrinsics` at the view's pose; the frame says which camera it was and where.
+    ///
+    /// # Errors
+    /// For a view from which there is no frame.
+    fn frame(&mut self, view: &View, intrinsics: &Intrinsics) -> Result<Sensed>;
+
+    /// Carries out a push by the arm: in, along the push, back. What an environment does not know of the objects (their
+    /// displacements, contacts and drops) it leaves empty.
+    ///
+    /// # Errors
+    /// Where the motion could not be begun.
+    fn carry_out(&mut self, arm: &Arm, motion: &PhasedMotion) -> Result<ManipulationOutcome>;
+
+    /// What is really there now, if that is known. `None` once is `None` always.
+    fn truth(&self) -> Option<&TruthMap>;
+
+    /// A copy that goes its own way from here on, if there can be one.
+    fn branch(&self) -> Option<Box<dyn Environment>>;
+
+    /// The simulation, for policies that know what would happen and for probes; `None` of everything else.
+    fn simulated(&self) -> Option<&Simulated> {
+        None
+    }
+}

@@ -1,0 +1,94 @@
+//! Looking at an episode whose shelf cannot be simulated: everything is as it is filed.
+
+use super::directory::EpisodeDir;
+use super::estimate::Told;
+use super::machine::Episode;
+use super::record::{StepOutcome, StepRecord};
+use super::resume::{Absent, Observer};
+use crate::arm::{Arm, PhasedMotion};
+use crate::belief::BeliefUpdate;
+use crate::camera::{Intrinsics, NoiseModel, Sensed, View, project};
+use crate::environment::Environment;
+use crate::scene::Catalog;
+use crate::world::{ManipulationOutcome, TruthMap};
+use crate::{Error, Result};
+use std::sync::Arc;
+
+/// An environment that is no longer there.
+struct Gone;
+
+impl Environment for Gone {
+    fn frame(&mut self, _: &View, _: &Intrinsics) -> Result<Sensed> {
+        Err(Error::Usage("this episode's surroundings are not here: it can only be looked at".to_owned()))
+    }
+
+    fn carry_out(&mut self, _: &Arm, _: &PhasedMotion) -> Result<ManipulationOutcome> {
+        Err(Error::Usage("this episode's surroundings are not here: it can only be looked at".to_owned()))
+    }
+
+    fn truth(&self) -> Option<&TruthMap> {
+        None
+    }
+
+    fn branch(&self) -> Option<Box<dyn Environment>> {
+        Some(Box::new(Self))
+    }
+}
+
+/// Shows every state of an episode as it is filed, with its frames if there are any. Predictions of pushes, and what has been
+/// seen, are inferred again with the update, if there is one.
+pub(super) fn look_through(
+    directory: &EpisodeDir,
+    catalog: Arc<Catalog>,
+    update: Option<Arc<dyn BeliefUpdate>>,
+    observer: Observer<'_>,
+) -> Result<Episode> {
+    let logged = directory.record()?;
+    let update = update.unwrap_or_else(|| Arc::new(Absent(logged.config.belief.clone())));
+    let scene = logged.scene.clone();
+    let mut episode = Episode::within(Box::new(Gone), scene, catalog, logged.config.clone(), update)?;
+    let has_frames = directory.check_frames(&logged).is_ok();
+    for done in 0..=logged.steps.len() {
+        let step = done.checked_sub(1).map(|at| &logged.steps[at]);
+        let told = step.filter(|_| has_frames).map(|step| directory.read_told(step)).transpose()?;
+        let outcome = step.map(|step| episode.retell(step, told));
+        episode.adopt_state(&logged, directory.read_belief(done)?, None);
+        observer(&episode, outcome.as_ref())?;
+    }
+    episode.adopt_log(logged);
+    Ok(episode)
+}
+
+impl Episode {
+    /// Takes note of a step of a log, and of what its belief update was told.
+    fn retell(&mut self, step: &StepRecord, told: Option<Told>) -> StepOutcome {
+        let (config, shelf) = (self.record().config.clone(), self.record().scene.shelf);
+        let mut outcome = StepOutcome {
+            record: step.clone(),
+            frame: None,
+            observation: None,
+            swept: None,
+            prediction: None,
+            manipulated: None,
+            motion: None,
+        };
+        let mut estimate = self.estimate().clone();
+        match told {
+            Some(Told::Frame(sensed)) => {
+                let noise = config.noise.unwrap_or(NoiseModel::OFF);
+                let frame = noise.apply(&sensed, config.seed, step.index as u64);
+                let observation = project(&frame, &shelf);
+                estimate.look(self.update(), &observation);
+                (outcome.frame, outcome.observation) = (Some(frame), Some(observation));
+            }
+            Some(Told::Manipulation(swept)) => {
+                let is_predicted = config.is_predicted(step.decision.reason);
+                outcome.prediction = estimate.manipulate(self.update(), &swept, is_predicted);
+                outcome.swept = Some(swept);
+            }
+            None => {}
+        }
+        self.take_note(step, estimate);
+        outcome
+    }
+}

@@ -344,7 +344,7 @@ impl EpisodeDir {
         let path = self.told_path(step);
         Ok(match step.action {
             Action::Look { .. } => Told::Frame(told_file::read_frame(&path)?),
-            Action::Manipulate(_) => Told::Push(told_file::read_push(&path, &self.grid()?)?),
+            Action::Manipulate(_) => Told::Manipulation(told_file::read_push(&path, &self.grid()?)?),
         })
     }
 

@@ -83,7 +83,7 @@ pub(super) fn weigh_clairvoyantly(
     situation: &Situation<'_>,
     gain: &Gain,
 ) -> (Weighed, Option<PushTruth>) {
-    let mut weighed = weigh_pushes(settings, situation, field);
+    let mut weighed = weigh_pushes(settings, situation, gain);
     let (at, motions): (Vec<usize>, Vec<PhasedMotion>) =
         weighed.motions.iter().enumerate().filter_map(|(at, motion)| Some((at, motion.clone()?))).unzip();
     let mut best: Option<(usize, PushTruth)> = None;
@@ -97,11 +97,12 @@ pub(super) fn weigh_clairvoyantly(
     (weighed, best.map(|(_, truth)| truth))
 }
 
-/// Draws one feasible push at random, from the frontier as in the paper, with those that were rejected on the way.
-pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
-    let (belief, arm) = (situation.belief, situation.arm);
-    let mut rng = push_stream(situation.seed, situation.history.actions.len());
-    let drawn = sample(PushSampler::Frontier, belief, None, arm, 1, &mut rng);
+/// Draws one feasible manipulation at random, pushes from the frontier as in the paper, with those that were rejected on the
+/// way.
+pub(super) fn random_push(situation: &Situation<'_>, skills: SkillSet) -> Weighed {
+    let (belief, arm, actions) = (situation.belief, situation.arm, situation.history.actions.len());
+    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier };
+    let drawn = random_candidate(skills, &ground, situation.seed, actions);
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
     let motions = drawn.into_iter().map(|drawn| drawn.motion).collect();

@@ -244,7 +244,7 @@ mod tests {
             let bodies = world.bodies();
             let watch = HiddenWatch::new(world.shelf(), &bodies, &array);
             assert_eq!(watch.hidden(), hidden_objects(world.shelf(), &bodies, &array));
-            for change in 0..3 {
+            for change in 0..6 {
                 let mut rng = stream(seed as u64, "changes", change);
                 let mut after = bodies.clone();
                 // Some are moved, also into each other; one is taken away.

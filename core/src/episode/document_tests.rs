@@ -117,7 +117,7 @@ fn settings_out_of_range_in_an_episode_were_taken() {
     let line = refusal("/planner/candidates", u64::MAX.into());
     assert!(line.starts_with("e.json: planner: --candidates "), "{line}");
     let line = refusal("/planner/quiet_steps", 100_000.into());
-    assert!(line.contains("--quiet-steps 100000: must be 0 to 1000"), "{line}");
+    assert!(line.contains("--quiet-steps 100000: must be a whole number of steps from 0 to 1000"), "{line}");
 }
 
 proptest! {

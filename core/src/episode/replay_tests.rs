@@ -187,7 +187,7 @@ fn who_only_looks_is_shown_what_is_filed_and_told_where_it_parts_from_what_is() 
     let occupied = first.truth().expect("a truth").occupancy[1234];
     assert_eq!([shown[0].2, shown[4].2, shown[5].2], [occupied, occupied, occupied ^ 1]);
     assert_eq!((shown.len(), whole.record()), (BUDGET + 1, &record));
-    assert_eq!(names_of(&path), ["beliefs", "episode.json", "truth"]);
+    assert_eq!(names_of(&path), ["beliefs", "checkpoints", "episode.json", "frames", "truth"]);
 
     // Without the update that it was made with.
     record.config.belief = "another".to_owned();

@@ -304,6 +304,7 @@ mod tests {
         let [far, middle] = [depth - 4, width / 2];
         let (before, owners) = put([[middle, far], [middle, 1], [2, far]]);
         let reach = TrueReach::new(&grid, &before, &array, density);
+        let mut differ = 0;
         for [x, y] in [[2, 2], [middle + 3, 1], [middle, 5]] {
             let (after, now) = put([[middle, far], [x, y], [2, far]]);
             let corner = |x: usize, y: usize, z: usize| {
@@ -313,9 +314,10 @@ mod tests {
             let quick = reach.after(&after, &[filled]);
             let fresh = TrueReach::new(&grid, &after, &array, density);
             assert_eq!(quick.shown(&now, 3), fresh.shown(&now, 3));
-            assert_ne!(quick.shown(&now, 3), reach.shown(&owners, 3));
+            differ += usize::from(quick.shown(&now, 3) != reach.shown(&owners, 3));
             assert!(quick.stopped == fresh.stopped && quick.opened == reach.opened(&after));
         }
+        assert!(differ > 0, "a move shows more or less of something");
     }
 
     #[test]

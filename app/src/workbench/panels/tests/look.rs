@@ -4,7 +4,7 @@
 use super::Stage;
 use crate::workbench::fixture::{self, Script};
 use crate::workbench::model::{LayoutKind, Model, Picked};
-use crate::workbench::panels::{Panel, camera, compare, curves, decision, episode, gains, maps, push, why};
+use crate::workbench::panels::{camera, compare, curves, decision, episode, gains, maps, push, why};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use nudge_core::camera::ViewId;

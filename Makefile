@@ -115,7 +115,7 @@ bench-window: workbench-build
 
 # Clippy and rustdoc run as a wrapper around the compiler, on the workspace alone and against what the build has compiled:
 # `cargo clippy` and `cargo doc` would check all dependencies once more.
-LINT := RUSTC_WORKSPACE_WRAPPER=$(CURDIR)/scripts/lint-rustc.sh $(CARGO) build --release --locked --workspace
+LINT := RUSTC_WORKSPACE_WRAPPER=$(CURDIR)/scripts/lint-rustc.sh $(CARGO) build --release --locked --workspace --keep-going
 lint: graphics networks
 	cargo fmt --all --check
 	$(LINT) --all-targets $(WINDOW)

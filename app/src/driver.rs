@@ -98,23 +98,11 @@ impl Story {
 }
 
 impl Driver {
-    /// Starts an episode in the directory `out` and writes its prior.
+    /// Starts an episode in the directory `out`, with or without what belief updates are told, and writes its prior.
     ///
     /// # Errors
     /// What [`Episode::new`] and [`EpisodeDir::create`] refuse; nothing is written then.
     pub fn start(
-        scene: Scene,
-        catalog: Arc<Catalog>,
-        config: EpisodeConfig,
-        update: Arc<dyn BeliefUpdate>,
-        out: &Path,
-        overwrite: Overwrite,
-    ) -> Result<Self> {
-        Self::start_filing(scene, catalog, config, update, out, overwrite, Frames::Filed)
-    }
-
-    /// The same, with or without what belief updates are told.
-    pub fn start_filing(
         scene: Scene,
         catalog: Arc<Catalog>,
         config: EpisodeConfig,

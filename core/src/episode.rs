@@ -26,6 +26,7 @@ mod told_file;
 
 pub use directory::{DirectoryState, EpisodeDir, Frames, Overwrite};
 pub use estimate::Told;
+pub use filed::Observer;
 pub use infer::infer;
 pub use judgement::{Judgement, NO_TRUTH, Prior};
 pub use machine::Episode;
@@ -35,4 +36,4 @@ pub use record::{
 };
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
 pub(crate) use resume::revisit;
-pub use resume::{Observer, resume, resume_from_checkpoint, review};
+pub use resume::{resume, resume_from_checkpoint, review};

@@ -4,6 +4,7 @@
 //! that is killed leaves at most one such leftover, which the next writer removes.
 
 use crate::{Error, Result};
+use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::io::Write;
@@ -124,6 +125,20 @@ pub fn names_in(path: &Path) -> Result<Vec<String>> {
             Ok(names)
         }
     }
+}
+
+/// Bytes of a file with a header: one line of JSON, and behind it `content`, compressed (Zstandard) at a level.
+pub(crate) fn with_head(head: &impl Serialize, content: &[u8], level: i32) -> Vec<u8> {
+    let mut bytes = serde_json::to_vec(head).expect("a header goes into memory");
+    bytes.push(b'\n');
+    bytes.extend(zstd::bulk::compress(content, level).expect("content is compressed in memory"));
+    bytes
+}
+
+/// The header and the compressed content of such a file; `None` for bytes without a first line.
+pub(crate) fn split_head(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let end = bytes.iter().position(|byte| *byte == b'\n')?;
+    Some((&bytes[..end], &bytes[end + 1..]))
 }
 
 /// SHA-256 of bytes, in hexadecimal digits.

@@ -47,7 +47,7 @@ fn scenes_that_are_no_scenes() {
 #[test]
 fn a_scene_without_objects_runs_with_a_warning() {
     let folder = Folder::new();
-    let file = folder.write("empty.toml", &scene(""));
+    let file = folder.write("empty.toml", scene(""));
     let out = folder.path("out");
     let output =
         nudge(&["run", &file, "--belief", "classical", "--budget", "2", "--out", out.to_str().expect("utf-8")]);
@@ -85,7 +85,7 @@ fn a_gigantic_mesh_is_refused() {
 #[test]
 fn output_folders_that_cannot_be_written() {
     let folder = Folder::new();
-    let file = folder.write("a.toml", &scene("[[object]]\nclass = \"tomato_can\"\nposition = [0.0, 0.2]\n"));
+    let file = folder.write("a.toml", scene("[[object]]\nclass = \"tomato_can\"\nposition = [0.0, 0.2]\n"));
     let blocked = folder.write("file", "not a folder");
     let line =
         nudge_fails(2, &["run", &file, "--belief", "classical", "--budget", "1", "--out", &format!("{blocked}/out")]);
@@ -107,7 +107,7 @@ fn output_folders_that_cannot_be_written() {
 #[test]
 fn truncated_episodes() {
     let folder = Folder::new();
-    let file = folder.write("a.toml", &scene("[[object]]\nclass = \"tomato_can\"\nposition = [0.0, 0.2]\n"));
+    let file = folder.write("a.toml", scene("[[object]]\nclass = \"tomato_can\"\nposition = [0.0, 0.2]\n"));
     let out = folder.path("e");
     let dir = out.to_str().expect("utf-8");
     nudge_ok(&["run", &file, "--belief", "classical", "--budget", "1", "--out", dir]);

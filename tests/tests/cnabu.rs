@@ -234,7 +234,7 @@ fn the_networks_believe_and_decide_the_same_on_any_number_of_threads_and_pinned_
             .arg(nudge_bin())
             .args(["run", "scenes/demo/behind-the-boxes.toml", "--policy", "mem", "--belief", "cnabu", "--budget", "3"])
             // Pushes are weighed from the first step on, so that both networks have a part in every decision.
-            .args(["--quiet-steps", "0", "--candidates", "8", "--seed", "2", "--json", "--out"])
+            .args(["--quiet-steps", "0", "--closing-steps", "1", "--candidates", "8", "--seed", "2", "--json", "--out"])
             .arg(&out)
             .current_dir(root())
             .output()

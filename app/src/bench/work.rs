@@ -5,7 +5,7 @@ use super::result::{EpisodeResult, EpisodeSeconds, tallied_steps};
 use super::store::BenchDir;
 use crate::driver::{Driver, belief_update};
 use nudge_core::camera::{ViewArray, hidden_objects};
-use nudge_core::episode::{Episode, EpisodeConfig, Overwrite};
+use nudge_core::episode::{Episode, EpisodeConfig, Frames, Overwrite};
 use nudge_core::scene::Catalog;
 use nudge_core::score::Tally;
 use nudge_core::{Error, Result};
@@ -187,7 +187,7 @@ pub fn run_episode(
         }
     };
     if let Some(path) = recording {
-        let mut driver = Driver::start(scene, catalog, config, update, path, Overwrite::Replace)?;
+        let mut driver = Driver::start(scene, catalog, config, update, path, Overwrite::Replace, Frames::Filed)?;
         while !driver.episode().is_finished() {
             let decision = driver.decide();
             driver.act(decision)?;

@@ -131,7 +131,7 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
     if !(args.resume && EpisodeDir::state(out)? == DirectoryState::Episode) {
         let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
         let frames = if args.no_frames && !args.frames { Frames::Left } else { Frames::Filed };
-        return Ok(Driver::start_filing(scene, catalog, config, update, out, overwrite, frames)?);
+        return Ok(Driver::start(scene, catalog, config, update, out, overwrite, frames)?);
     }
     let logged = EpisodeDir::open(out)?.record()?;
     same_episode(&logged, &scene, &config, out)?;

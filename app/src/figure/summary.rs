@@ -356,9 +356,8 @@ fn plots(svg: &mut Svg, summary: &Summary<'_>, top: f32) {
         marked: marked.clone(),
     };
     let most = (0..=record.steps.len()).map(|step| record.entropy_after(step)).fold(1.0, f64::max) / 1e3;
-    let score = |value: fn(&Scores) -> f64| -> Box<dyn Fn(&EpisodeRecord, usize) -> Option<f64>> {
-        Box::new(move |record, step| record.scores_after(step).map(value))
-    };
+    let score =
+        |value: fn(&Scores) -> f64| move |record: &EpisodeRecord, step: usize| record.scores_after(step).map(value);
     let mut occupancy = curves("mean", [31, 90, 150], &score(|s| s.occupancy_iou));
     if beside.is_none() {
         occupancy.extend(curves("occupied", [110, 168, 214], &score(|s| s.occupied_iou)));

@@ -10,7 +10,7 @@ use super::threads::Threads;
 use crate::driver::{Driver, update_of};
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, hidden_objects};
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Overwrite, StepOutcome, review};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Overwrite, StepOutcome, review};
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
 use nudge_core::{Error, Result};
@@ -295,14 +295,16 @@ fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Resu
     match begin {
         Begin::Start { scene, config, out } => {
             let update = update_named(&config.belief, &config)?;
-            let driver = Driver::start(*scene, catalog, *config, update.clone(), &out, Overwrite::Refuse)?;
+            let driver =
+                Driver::start(*scene, catalog, *config, update.clone(), &out, Overwrite::Refuse, Frames::Filed)?;
             let moments = vec![Arc::new(moment(driver.episode(), None, None))];
             let opened = opened(&out, driver.episode(), Some(update), moments, None)?;
             Ok((Track::Writing(Box::new(driver)), opened))
         }
         Begin::Branch { of, steps, out } => {
             let update = update_named(&of.config.belief, &of.config)?;
-            let mut driver = Driver::start(of.scene, catalog, of.config, update.clone(), &out, Overwrite::Refuse)?;
+            let mut driver =
+                Driver::start(of.scene, catalog, of.config, update.clone(), &out, Overwrite::Refuse, Frames::Filed)?;
             let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
             for (done, step) in of.steps.into_iter().take(steps).enumerate() {
                 progress(post, brake, done, steps)?;

@@ -111,7 +111,7 @@ pub(super) fn decode(bytes: &[u8], width: usize, height: usize) -> Option<(Vec<f
     let has = |at: usize| there[at / 8] >> (at % 8) & 1 == 1;
     let readings = (0..pixels).filter(|at| has(*at)).count();
     let planes = planes.get(..4 * readings)?;
-    let mut depth_m = vec![0.0; pixels];
+    let mut depth_m = Vec::with_capacity(pixels);
     let mut surface = Surface::new(width);
     let mut next = 0;
     for at in 0..pixels {
@@ -119,17 +119,19 @@ pub(super) fn decode(bytes: &[u8], width: usize, height: usize) -> Option<(Vec<f
             surface.begin_row();
         }
         let predicted = surface.predict();
+        let mut depth = 0.0;
         if has(at) {
             let count = (0..4).map(|byte| u32::from(planes[byte * readings + next]) << (8 * byte)).sum::<u32>();
             next += 1;
             let off = (count >> 1) as i32 ^ -((count & 1) as i32);
-            depth_m[at] = f32::from_bits((predicted.to_bits() as i32).wrapping_add(off) as u32);
+            depth = f32::from_bits((predicted.to_bits() as i32).wrapping_add(off) as u32);
             // No depth would be a pixel that is not there.
-            if !(depth_m[at] > 0.0 && depth_m[at].is_finite()) {
+            if !(depth > 0.0 && depth.is_finite()) {
                 return None;
             }
         }
-        surface.take(depth_m[at], predicted);
+        surface.take(depth, predicted);
+        depth_m.push(depth);
     }
     Some((depth_m, pixels.div_ceil(8) + 4 * readings))
 }

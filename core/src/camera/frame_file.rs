@@ -7,6 +7,7 @@
 //! camera alone would be half a megabyte a frame.
 
 use super::{Frame, Pinhole, PixelClasses, Sensed, depth_code, pose_from_quaternion};
+use crate::files::{split_head, with_head};
 use crate::scene::CLASS_COUNT;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -62,10 +63,7 @@ impl Sensed {
             PixelClasses::Scores(scores) => content.extend(scores.iter().flat_map(|score| score.to_le_bytes())),
         }
         content.extend(self.objects.iter().flatten().flat_map(|object| object.to_le_bytes()));
-        let mut bytes = serde_json::to_vec(&head).expect("a header goes into memory");
-        bytes.push(b'\n');
-        bytes.extend(zstd::bulk::compress(&content, LEVEL).expect("a frame is compressed in memory"));
-        bytes
+        with_head(&head, &content, LEVEL)
     }
 
     /// Reads a file's bytes; `file` is what errors name.
@@ -75,8 +73,8 @@ impl Sensed {
     /// was seen is allowed here, a simulated camera may look away).
     pub fn from_bytes(bytes: &[u8], file: &Path) -> Result<Self> {
         let fail = |place: &str, words: String| Error::input(file, place, words);
-        let end = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(|| fail("", "is no frame".to_owned()))?;
-        let head: Head = serde_json::from_slice(&bytes[..end]).map_err(|error| {
+        let (head, content) = split_head(bytes).ok_or_else(|| fail("", "is no frame".to_owned()))?;
+        let head: Head = serde_json::from_slice(head).map_err(|error| {
             let words = error.to_string();
             fail("line 1", words.split(" at line ").next().unwrap_or("is no frame's").to_owned())
         })?;
@@ -94,7 +92,7 @@ impl Sensed {
         };
         let of_objects = if head.objects { 2 * pixels } else { 0 };
         let largest = pixels.div_ceil(8) + 4 * pixels + of_classes + of_objects;
-        let content = zstd::bulk::decompress(&bytes[end + 1..], largest)
+        let content = zstd::bulk::decompress(content, largest)
             .map_err(|error| fail("", format!("is cut short or damaged ({error})")))?;
         let (depth_m, used) = depth_code::decode(&content, width, height)
             .ok_or_else(|| fail("depth_m", "is cut short or damaged".to_owned()))?;

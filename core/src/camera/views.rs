@@ -75,7 +75,7 @@ impl RawView {
             (Some(target), None) => {
                 let upright = look_at(self.position, target.0)?;
                 let Some(roll_deg) = self.roll_deg else { return Ok((upright, target.0)) };
-                if !(roll_deg.abs() <= 360.0) {
+                if !(-360.0..=360.0).contains(&roll_deg) {
                     return Err(format!("roll_deg is {roll_deg}; -360 to 360 are allowed"));
                 }
                 let roll = UnitQuaternion::from_axis_angle(&Vector::z_axis(), roll_deg.to_radians());

@@ -11,6 +11,7 @@ use super::told_file::voxel_set;
 use crate::arm::HandPose;
 use crate::belief::{Belief, Sightings};
 use crate::environment::Environment;
+use crate::files::{split_head, with_head};
 use crate::grid::Grid;
 use crate::plan::{Action, History};
 use crate::world::Standing;
@@ -45,8 +46,6 @@ impl Checkpoint {
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         let Estimate { belief, sightings } = &self.estimate;
         let head = Head { format: FORMAT, dims: belief.grid.dims, standing: self.standing.clone() };
-        let mut bytes = serde_json::to_vec(&head).expect("a header goes into memory");
-        bytes.push(b'\n');
         let evidence = || belief.occupancy.as_flattened().iter().chain(belief.semantics.as_flattened());
         let mut content = Vec::with_capacity(5 * evidence().count());
         // Bytes of equal weight together: the compressor finds more.
@@ -55,21 +54,20 @@ impl Checkpoint {
         }
         content.extend(sightings.seen().words().iter().flat_map(|word| word.to_le_bytes()));
         content.extend(sightings.taken());
-        bytes.extend(zstd::bulk::compress(&content, LEVEL).expect("a state is compressed in memory"));
-        bytes
+        with_head(&head, &content, LEVEL)
     }
 
     /// Reads a file's bytes; `None` for those that are no whole checkpoint of an episode over this grid.
     pub(super) fn from_bytes(bytes: &[u8], grid: &Grid) -> Option<Self> {
-        let end = bytes.iter().position(|byte| *byte == b'\n')?;
-        let head: Head = serde_json::from_slice(&bytes[..end]).ok()?;
+        let (head, content) = split_head(bytes)?;
+        let head: Head = serde_json::from_slice(head).ok()?;
         if head.format != FORMAT || head.dims != grid.dims {
             return None;
         }
         let mut belief = Belief::uniform(*grid);
         let numbers = belief.occupancy.as_flattened().len() + belief.semantics.as_flattened().len();
         let words = 8 * grid.voxel_count().div_ceil(64);
-        let content = zstd::bulk::decompress(&bytes[end + 1..], 4 * numbers + words + grid.cell_count()).ok()?;
+        let content = zstd::bulk::decompress(content, 4 * numbers + words + grid.cell_count()).ok()?;
         let (evidence, seen) = content.split_at_checked(4 * numbers)?;
         let (seen, taken) = seen.split_at_checked(words)?;
         let number = |at: usize| f32::from_le_bytes([0, 1, 2, 3].map(|byte| evidence[byte * numbers + at]));

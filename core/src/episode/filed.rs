@@ -4,15 +4,34 @@ use super::directory::EpisodeDir;
 use super::estimate::Told;
 use super::machine::Episode;
 use super::record::{StepOutcome, StepRecord};
-use super::resume::{Absent, Observer};
 use crate::arm::{Arm, PhasedMotion};
-use crate::belief::BeliefUpdate;
-use crate::camera::{Intrinsics, NoiseModel, Sensed, View, project};
+use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction};
+use crate::camera::{Intrinsics, MapObservation, NoiseModel, Sensed, View, project};
 use crate::environment::Environment;
 use crate::scene::Catalog;
 use crate::world::{ManipulationOutcome, TruthMap};
 use crate::{Error, Result};
 use std::sync::Arc;
+
+/// Called for every state of an episode that is opened, with the outcome of the last action.
+pub type Observer<'a> = &'a mut dyn FnMut(&Episode, Option<&StepOutcome>) -> Result<()>;
+
+/// Placeholder for an update that the log names and this program lacks: leaves every belief as it is.
+pub(super) struct Absent(pub(super) String);
+
+impl BeliefUpdate for Absent {
+    fn name(&self) -> &str {
+        &self.0
+    }
+
+    fn observe(&self, belief: &Belief, _observation: &MapObservation) -> Belief {
+        belief.clone()
+    }
+
+    fn predict(&self, _belief: &Belief, _interventions: &[Intervention]) -> Vec<Prediction> {
+        Vec::new()
+    }
+}
 
 /// An environment that is no longer there.
 struct Gone;

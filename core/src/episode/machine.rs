@@ -179,7 +179,7 @@ impl Episode {
     }
 
     /// Does `decision.action`, updates belief, truth and scores, and returns everything that it brought. The decision
-    /// may be another than the policy's (of [`Reason::Manual`]). Its `decide` seconds are those of the last
+    /// may be another than the policy's (of [`Reason::Manual`](crate::plan::Reason::Manual)). Its `decide` seconds are those of the last
     /// [`Episode::decide`] before.
     ///
     /// # Errors

@@ -1,21 +1,17 @@
 //! Opening an episode again: to continue a run that was stopped, or to look at it.
 
 use super::directory::EpisodeDir;
-use super::filed;
+use super::filed::{self, Absent, Observer};
 use super::judgement::NO_TRUTH;
 use super::machine::Episode;
-use super::record::{EpisodeRecord, StepOutcome};
+use super::record::EpisodeRecord;
 use super::replay::{Comparison, Difference};
-use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction};
-use crate::camera::MapObservation;
+use crate::belief::BeliefUpdate;
 use crate::scene::Catalog;
 use crate::score::Scores;
 use crate::{Error, Result};
 use std::path::Path;
 use std::sync::Arc;
-
-/// Called for every state of an episode that is opened, with the outcome of the last action.
-pub type Observer<'a> = &'a mut dyn FnMut(&Episode, Option<&StepOutcome>) -> Result<()>;
 
 /// Opens the episode in `path` to continue it: repeats the actions of its log without deciding anew, and verifies after
 /// every one that belief, truth and scores are those in the directory, the beliefs bit for bit. `observer` is called
@@ -125,23 +121,6 @@ pub(crate) fn revisit(
     observer: Observer<'_>,
 ) -> Result<Option<Difference>> {
     Ok(retrace(directory, catalog, update, Departure::Overruled, actions, observer)?.1)
-}
-
-/// Placeholder for an update that the log names and this program lacks: leaves every belief as it is.
-pub(super) struct Absent(pub(super) String);
-
-impl BeliefUpdate for Absent {
-    fn name(&self) -> &str {
-        &self.0
-    }
-
-    fn observe(&self, belief: &Belief, _observation: &MapObservation) -> Belief {
-        belief.clone()
-    }
-
-    fn predict(&self, _belief: &Belief, _interventions: &[Intervention]) -> Vec<Prediction> {
-        Vec::new()
-    }
 }
 
 /// What to do where repeated actions do not lead where the log says.

@@ -5,6 +5,7 @@
 
 use super::estimate::Told;
 use crate::camera::Sensed;
+use crate::files::{split_head, with_head};
 use crate::grid::{Grid, VoxelSet};
 use crate::skill::{Manipulation, SweptManipulation};
 use crate::{Error, Result};
@@ -43,17 +44,8 @@ impl Told {
 }
 
 fn push_bytes(swept: &SweptManipulation) -> Vec<u8> {
-    let head = Head { format: FORMAT, manipulation: swept.manipulation };
-    let mut bytes = serde_json::to_vec(&head).expect("a header goes into memory");
-    bytes.push(b'\n');
-    bytes.extend(packed(&swept.swept, LEVEL));
-    bytes
-}
-
-/// The bits of a voxel set, compressed.
-pub(super) fn packed(set: &VoxelSet, level: i32) -> Vec<u8> {
-    let words: Vec<u8> = set.words().iter().flat_map(|word| word.to_le_bytes()).collect();
-    zstd::bulk::compress(&words, level).expect("a voxel set is compressed in memory")
+    let words: Vec<u8> = swept.swept.words().iter().flat_map(|word| word.to_le_bytes()).collect();
+    with_head(&Head { format: FORMAT, manipulation: swept.manipulation }, &words, LEVEL)
 }
 
 /// The voxel set of bytes, which are not compressed.
@@ -71,12 +63,12 @@ pub(super) fn read_frame(path: &Path) -> Result<Sensed> {
 pub(super) fn read_push(path: &Path, grid: &Grid) -> Result<SweptManipulation> {
     let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
     let fail = |place: &str, words: &str| Error::input(path, place, words);
-    let end = bytes.iter().position(|byte| *byte == b'\n').ok_or_else(|| fail("", "is no push"))?;
-    let head: Head = serde_json::from_slice(&bytes[..end]).map_err(|_| fail("line 1", "is not that of a push"))?;
+    let (head, content) = split_head(&bytes).ok_or_else(|| fail("", "is no push"))?;
+    let head: Head = serde_json::from_slice(head).map_err(|_| fail("line 1", "is not that of a push"))?;
     if head.format != FORMAT {
         return Err(fail("format", &format!("is {}, this version reads {FORMAT}", head.format)));
     }
-    let words = zstd::bulk::decompress(&bytes[end + 1..], 8 * grid.voxel_count().div_ceil(64))
+    let words = zstd::bulk::decompress(content, 8 * grid.voxel_count().div_ceil(64))
         .map_err(|error| fail("", &format!("is cut short or damaged ({error})")))?;
     let swept = voxel_set(grid, &words).ok_or_else(|| fail("", "sweeps another grid than the scene's"))?;
     Ok(SweptManipulation { manipulation: head.manipulation, swept })

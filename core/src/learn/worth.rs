@@ -5,7 +5,7 @@
 //!
 //! # Episodes and states
 //!
-//! An episode begins in a settled shelf of a [`Family`](crate::scene::Family) with nothing known; of up to 16 shelves that are
+//! An episode begins in a settled shelf of a [`Family`] with nothing known; of up to 16 shelves that are
 //! drawn the first that hides one to six objects or more, else the one that hides most. It has [`STATES_PER_EPISODE`]
 //! states. Before each come one to three looks, and before those (not before the first state, in three of five cases) a
 //! push: half of the time the one that promises most of the pushes from the state before, else one of them at random. So a state has

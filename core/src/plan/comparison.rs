@@ -136,7 +136,7 @@ impl Decision {
             terms.push(Term { kind, nats, words, decides: by_rule && side == Some(winner) });
         };
         let needed = rule.needed(self.igv);
-        let pushing = self.compares_a_push().then(|| self.igm + rule.settings.gamma * self.reg);
+        let pushing = self.compares_a_push().then_some(self.igm + rule.settings.gamma * self.reg);
         term(TermKind::Look, self.igv, rule.settings.counted.of_looks().to_owned());
         if pushing.is_some() {
             if needed != self.igv {

@@ -233,7 +233,7 @@ impl Reader<'_> {
             }
             self.at += 1;
             // `use a::{self, b}` names `a`.
-            if word != "::" && !(word == "self" && !path.is_empty()) {
+            if (path.is_empty() || word != "self") && word != "::" {
                 path.push(word);
             }
             if self.look(0) != "::" && !matches!(self.tokens[self.at - 1].as_str(), "::") {

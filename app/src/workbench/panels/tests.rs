@@ -13,8 +13,11 @@ use std::sync::Arc;
 mod form;
 mod look;
 
+/// Makes a panel that has drawn nothing yet.
+type Make = fn() -> Box<dyn Panel>;
+
 /// The panels of an episode, each as it is before it has drawn anything.
-const PANELS: [(&str, fn() -> Box<dyn Panel>); 8] = [
+const PANELS: [(&str, Make); 8] = [
     ("maps", || Box::new(maps::State::default())),
     ("camera", || Box::new(camera::State::default())),
     ("curves", || Box::new(curves::show)),

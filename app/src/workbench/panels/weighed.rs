@@ -250,9 +250,9 @@ mod tests {
     #[test]
     fn the_best_push_stands_on_top_of_the_table_though_another_one_has_a_larger_value() {
         let mut decision = fixture::session(1).moments[4].decision().expect("step 4").clone();
-        let feasible: Vec<usize> =
-            (0..decision.candidates.len()).filter(|at| decision.candidates[*at].rejection.is_none()).collect();
-        let [.., other, best] = feasible[..] else { panic!("two feasible pushes") };
+        let best = decision.candidates.iter().position(|push| push.rejection.is_none()).expect("a feasible push");
+        let other = decision.candidates.len();
+        decision.candidates.push(decision.candidates[best].clone());
         (decision.candidates[other].gain, decision.candidates[other].reg) = (Some(1e6), Some(0.0));
         decision.best_push = Some(best);
         for listed in [Listed::Best, Listed::All] {

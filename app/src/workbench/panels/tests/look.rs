@@ -4,7 +4,7 @@
 use super::Stage;
 use crate::workbench::fixture::{self, Script};
 use crate::workbench::model::{LayoutKind, Model, Picked};
-use crate::workbench::panels::{Panel, camera, compare, curves, decision, episode, gains, maps, push, why};
+use crate::workbench::panels::{camera, compare, curves, decision, episode, gains, maps, push, why};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use nudge_core::camera::ViewId;
@@ -44,7 +44,7 @@ fn pictures() {
     let out =
         std::env::var_os("NUDGE_PICTURES").map_or_else(|| std::env::temp_dir().join("nudge-panels"), PathBuf::from);
     std::fs::create_dir_all(&out).expect("directory");
-    let shots: [(&str, fn() -> Box<dyn Panel>, [f32; 2], usize); 11] = [
+    let shots: [(&str, super::Make, [f32; 2], usize); 11] = [
         ("maps", || Box::new(maps::State::default()), [520.0, 640.0], 8),
         ("camera", || Box::new(camera::State::default()), [520.0, 260.0], 8),
         ("curves", || Box::new(curves::show), [900.0, 190.0], 7),

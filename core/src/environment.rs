@@ -1,4 +1,4 @@
-//! Where images come from and pushes go: a simulated shelf, a recording, a robot.
+//! Where images come from and motions go: a simulated shelf, a recording, a robot.
 //!
 //! An [`Episode`](crate::episode::Episode) knows its surroundings only through [`Environment`]. It asks for a frame from a
 //! view, has a motion carried out and is told what happened; if the surroundings know the truth, it is scored. Whatever can
@@ -23,7 +23,7 @@ pub trait Environment: Send + Sync {
     /// For a view from which there is no frame.
     fn frame(&mut self, view: &View, intrinsics: &Intrinsics) -> Result<Sensed>;
 
-    /// Carries out a push by the arm: in, along the push, back. What an environment does not know of the objects (their
+    /// Carries out a motion of the arm, phase by phase. What an environment does not know of the objects (their
     /// displacements, contacts and drops) it leaves empty.
     ///
     /// # Errors

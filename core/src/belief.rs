@@ -6,12 +6,14 @@
 
 mod classical;
 mod floor;
+mod held;
 mod intervention;
 mod networks;
 mod sightings;
 
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
+pub(crate) use held::predict_held_apart;
 pub(crate) use intervention::Met;
 #[cfg(feature = "cnabu")]
 pub(crate) use intervention::Moved;

@@ -269,7 +269,7 @@ impl Situation<'_> {
     /// What candidates are drawn from.
     fn ground(&self, settings: &PlannerSettings) -> Ground<'_> {
         let seen = settings.counted.left_out(self.seen);
-        Ground { belief: self.belief, seen, arm: self.arm, sampler: settings.push_sampler }
+        Ground { belief: self.belief, seen, arm: self.arm, sampler: settings.push_sampler, place: settings.place }
     }
 
     /// The views that are offered, by id.

@@ -122,6 +122,16 @@ impl MeshShape {
 }
 
 impl Scene {
+    /// The same with the hand that is needed, where the scene names no arm of its own: of the arms that come with the program
+    /// the one that takes objects by suction, or the one with the gripper.
+    #[must_use]
+    pub fn with_hand_for(mut self, picks: bool) -> Self {
+        if picks && self.robot.urdf.is_none() {
+            self.robot.urdf = Some(RobotFile::suction());
+        }
+        self
+    }
+
     /// The scene's voxel grid.
     pub fn grid(&self) -> Grid {
         self.shelf.grid()

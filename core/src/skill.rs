@@ -12,6 +12,7 @@ mod clearance;
 mod counterfactual;
 mod drag;
 mod manipulation;
+pub mod pick;
 pub mod push;
 mod registry;
 mod rejection;
@@ -21,6 +22,7 @@ mod shown;
 pub use clearance::{AVOIDED, ArmClearance};
 pub use counterfactual::{Counterfactual, PushTruth, REACH_DENSITY};
 pub use manipulation::{SweptManipulation, intended, random_candidate};
+pub use pick::{Pick, PickPlace};
 pub use push::{Push, PushSampler};
 pub use registry::{Manipulation, SkillKind, SkillSet};
 pub use rejection::{Rejection, Stage};
@@ -30,6 +32,7 @@ use crate::arm::{Arm, ArmTool, Joints, PhasedMotion};
 use crate::belief::{Belief, FloorPlan, Intervention};
 use crate::grid::{Voxel, VoxelSet};
 use crate::rng::ChaCha8Rng;
+use crate::world::ManipulationOutcome;
 
 /// Occupancy probability from which a voxel counts as surely occupied (high confidence).
 pub const CONFIDENT: f32 = 0.85;
@@ -49,6 +52,8 @@ pub struct Ground<'a> {
     pub arm: &'a ArmTool,
     /// Where pushes are drawn.
     pub sampler: PushSampler,
+    /// Where what is picked is set down.
+    pub place: PickPlace,
 }
 
 /// One thing that the arm can do. The type that implements it is what there is to choose about one such manipulation.
@@ -80,6 +85,11 @@ pub trait Skill {
 
     /// The same as far as the arm came, when it was blocked after `way_m`.
     fn shortened(&self, way_m: f32) -> Manipulation;
+
+    /// It as it was carried out: as far as the arm came.
+    fn done(&self, outcome: &ManipulationOutcome) -> Manipulation {
+        self.shortened(if outcome.stalled { outcome.way_m.min(self.way_m()) } else { self.way_m() })
+    }
 
     /// It in words and numbers.
     fn describe(&self) -> Description;

@@ -6,7 +6,8 @@ mod manipulate;
 mod physics;
 mod truth;
 
-pub use manipulate::LinkContact;
+pub use manipulate::{Grip, GripEnd, LinkContact};
+pub use physics::{BEND_NM, PULL_N, STROKE_M};
 pub use truth::TruthMap;
 
 use crate::arm::Joints;
@@ -43,6 +44,8 @@ pub struct World {
     bodies: Vec<Body>,
     /// Per body, whether it has left the board.
     dropped: Vec<bool>,
+    /// Per body, whether the arm has laid it down beside the robot.
+    stowed: Vec<bool>,
     physics: Physics,
 }
 
@@ -53,6 +56,14 @@ pub struct Standing {
     pub world_from_body: Pose,
     /// Whether it has left the board.
     pub dropped: bool,
+    /// Whether the arm has laid it down beside the robot.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub stowed: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde hands fields over by reference")]
+fn is_false(flag: &bool) -> bool {
+    !*flag
 }
 
 /// What a manipulation did.
@@ -75,6 +86,8 @@ pub struct ManipulationOutcome {
     pub against_wall: Vec<ObjectId>,
     /// How deep the arm got into a panel of the shelf at most, metres.
     pub arm_in_shelf_m: f32,
+    /// What became of what the cup was to hold; `None` for a motion without suction.
+    pub grip: Option<Grip>,
     /// How long the arm moved, seconds.
     pub arm_s: f32,
     /// The configurations that the arm passed until it turned back.
@@ -85,7 +98,7 @@ impl World {
     /// The world of the given bodies, not yet settled.
     pub fn new(shelf: Shelf, bodies: Vec<Body>) -> Self {
         let physics = Physics::new(&shelf, &bodies);
-        Self { shelf, dropped: vec![false; bodies.len()], bodies, physics }
+        Self { shelf, dropped: vec![false; bodies.len()], stowed: vec![false; bodies.len()], bodies, physics }
     }
 
     /// Lets the bodies come to rest; returns the largest displacement of an object, metres.
@@ -102,15 +115,24 @@ impl World {
         &self.shelf
     }
 
-    /// The bodies where they are now, dropped ones left out.
+    /// The bodies where they are now; those left out that have left the board or were laid down beside the robot.
     pub fn bodies(&self) -> Vec<Body> {
-        self.bodies.iter().zip(&self.dropped).filter(|(_, dropped)| !**dropped).map(|(body, _)| body.clone()).collect()
+        (0..self.bodies.len()).filter(|at| !self.is_gone(*at)).map(|at| self.bodies[at].clone()).collect()
+    }
+
+    /// Whether a body is no longer in the shelf.
+    fn is_gone(&self, at: usize) -> bool {
+        self.dropped[at] || self.stowed[at]
     }
 
     /// Where every body stands, in the order of the bodies that the world was made of.
     pub fn standing(&self) -> Vec<Standing> {
-        let both = self.bodies.iter().zip(&self.dropped);
-        both.map(|(body, dropped)| Standing { world_from_body: body.world_from_body, dropped: *dropped }).collect()
+        let of = |at: usize| Standing {
+            world_from_body: self.bodies[at].world_from_body,
+            dropped: self.dropped[at],
+            stowed: self.stowed[at],
+        };
+        (0..self.bodies.len()).map(of).collect()
     }
 
     /// This world's bodies as they would be elsewhere, dropped ones left out; the world stays as it is.
@@ -121,7 +143,7 @@ impl World {
         if standing.len() != self.bodies.len() {
             return Err(format!("{} bodies where the scene has {}", standing.len(), self.bodies.len()));
         }
-        let both = self.bodies.iter().zip(standing).filter(|(_, at)| !at.dropped);
+        let both = self.bodies.iter().zip(standing).filter(|(_, at)| !at.dropped && !at.stowed);
         Ok(both.map(|(body, at)| Body { world_from_body: at.world_from_body, ..body.clone() }).collect())
     }
 
@@ -147,7 +169,7 @@ impl World {
         self.physics.stop_all();
         for at in 0..self.bodies.len() {
             // Nothing holds a body up out here; this is for one that was stopped while it slid over the edge.
-            if !self.dropped[at] && self.is_outside(at) {
+            if !self.is_gone(at) && self.is_outside(at) {
                 self.drop_body(at);
             }
         }
@@ -156,7 +178,7 @@ impl World {
     /// Takes away bodies that have fallen past the board.
     fn note_drops(&mut self) {
         for at in 0..self.bodies.len() {
-            if !self.dropped[at] && self.physics.center_of_mass(at).z < -physics::FALL_M {
+            if !self.is_gone(at) && self.physics.center_of_mass(at).z < -physics::FALL_M {
                 self.drop_body(at);
             }
         }
@@ -166,6 +188,16 @@ impl World {
         self.bodies[at].world_from_body = self.physics.pose(at);
         self.dropped[at] = true;
         self.physics.remove(at);
+    }
+
+    /// Lays what the cup holds down beside the robot.
+    fn stow(&mut self) {
+        if let Some(at) = self.physics.held() {
+            self.physics.let_go();
+            self.bodies[at].world_from_body = self.physics.pose(at);
+            self.stowed[at] = true;
+            self.physics.remove(at);
+        }
     }
 
     /// Whether a body's centre of mass is no longer over the board.
@@ -180,7 +212,7 @@ impl World {
 
     fn read_back(&mut self) {
         for (at, body) in self.bodies.iter_mut().enumerate() {
-            if !self.dropped[at] {
+            if !self.dropped[at] && !self.stowed[at] {
                 body.world_from_body = self.physics.pose(at);
             }
         }

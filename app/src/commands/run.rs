@@ -10,7 +10,7 @@ use nudge_core::episode::{
     DirectoryState, Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Overwrite, StepOutcome, StepRecord,
 };
 use nudge_core::plan::{Action, PolicyKind};
-use nudge_core::scene::{Catalog, ObjectId, Scene};
+use nudge_core::scene::{Catalog, ObjectId, RobotFile, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -20,8 +20,12 @@ use std::time::Instant;
 pub struct Args {
     /// The scene file
     scene: PathBuf,
+    /// The arm, in place of the scene's: gripper or suction, which come with the program, or a URDF file; by default the
+    /// hand is what the policy needs
+    #[arg(long, value_name = "gripper|suction|FILE")]
+    arm: Option<String>,
     /// The rule that chooses actions: mem, mem-no-push, random, random-cnabu, random-push-5, random-push-5-blind,
-    /// random-view-push-5, saturation; and as ceilings, since they know the truth, oracle (the view that really tells most) and
+    /// random-view-push-5, saturation; with suction mem-pick, random-pick-5, greedy-front-pick; and as ceilings, since they know the truth, oracle (the view that really tells most) and
     /// clairvoyant-push (mem, but each push is carried out in a copy of the world before one is chosen)
     #[arg(long, default_value = "mem")]
     policy: PolicyKind,
@@ -64,7 +68,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let started = Instant::now();
     args.planning.device.choose()?;
     let catalog = Arc::new(Catalog::standard());
-    let (scene, warnings) = Scene::load(&args.scene, &catalog)?;
+    let (mut scene, warnings) = Scene::load(&args.scene, &catalog)?;
+    if let Some(arm) = &args.arm {
+        scene.robot.urdf = Some(RobotFile::named(arm)?);
+    }
     for warning in warnings {
         super::warn(&format!("{}: {warning}", args.scene.display()));
     }
@@ -118,6 +125,7 @@ fn beside_of(out: &Path, policy: PolicyKind) -> PathBuf {
 
 /// Begins an episode, or goes on with the one that is there and is to be resumed.
 fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, out: &Path) -> anyhow::Result<Driver> {
+    let scene = scene.with_hand_for(policy.picks());
     let update = belief_update(args.planning.belief.as_deref(), policy)?;
     let config = EpisodeConfig {
         policy,

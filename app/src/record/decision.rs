@@ -370,6 +370,7 @@ mod tests {
             contacts: Vec::new(),
             against_wall: Vec::new(),
             arm_in_shelf_m: 0.0,
+            grip: None,
         });
         assert_eq!(mishaps(&record), ["the arm was blocked after 50 of 140 mm of its push"]);
         assert_eq!(length(&record).as_deref(), Some("50 of 140 mm"));

@@ -17,6 +17,9 @@ pub fn of(policy: PolicyKind) -> (Rgb, [f32; 2]) {
         PolicyKind::RandomPush5Blind => ([128, 40, 90], [6.0, 3.0]),
         PolicyKind::RandomViewPush5 => ([158, 112, 0], [2.0, 4.0]),
         PolicyKind::Saturation => ([40, 130, 190], [6.0, 3.0]),
+        PolicyKind::MemPick => ([120, 60, 170], [0.0, 0.0]),
+        PolicyKind::RandomPick5 => ([150, 110, 190], [7.0, 3.0]),
+        PolicyKind::GreedyFrontPick => ([90, 90, 150], [2.0, 4.0]),
         PolicyKind::Oracle => ([0, 0, 0], [3.0, 3.0]),
         PolicyKind::ClairvoyantPush => ([0, 0, 0], [9.0, 3.0]),
     }

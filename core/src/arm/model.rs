@@ -75,6 +75,13 @@ pub struct Part {
     pub around: Ball,
 }
 
+/// A suction cup at the tool's frame, which points along its z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cup {
+    /// Radius of the rim, metres.
+    pub radius_m: f64,
+}
+
 /// A serial arm that stands somewhere.
 #[derive(Clone, Debug)]
 pub struct Arm {
@@ -94,6 +101,8 @@ pub struct Arm {
     pub tool_link: String,
     /// The link that is the camera's frame.
     pub camera_link: Option<String>,
+    /// The suction cup of a hand that has one; its rim is at the tool's frame.
+    pub cup: Option<Cup>,
     /// What a person should know about the file that it was read from.
     pub warnings: Vec<String>,
     /// Per joint, how far the farthest point that it moves can be from its axis, metres (1 for a sliding joint): a

@@ -12,6 +12,9 @@ pub const CONTACT_M_S: f64 = 0.10;
 /// Speed of the tip on the way back, metres per second.
 pub const WAY_BACK_M_S: f64 = 0.50;
 
+/// Speed of the tip with an object in hand, metres per second.
+pub const CARRY_M_S: f64 = 0.15;
+
 /// What a phase of a motion is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -20,6 +23,10 @@ pub enum PhaseKind {
     Approach,
     /// While the tool touches what it is to move.
     Contact,
+    /// While the cup holds what it has taken: suction is on from its beginning to its end.
+    Carry,
+    /// What is held is laid down beside the robot; the arm is away from the shelf.
+    Stow,
     /// Back to where the arm waits.
     Retreat,
 }
@@ -106,7 +113,7 @@ impl PhasedMotion {
     }
 
     /// The phases of a kind.
-    fn of_kind(&self, kind: PhaseKind) -> impl DoubleEndedIterator<Item = &Phase> {
+    pub(crate) fn of_kind(&self, kind: PhaseKind) -> impl DoubleEndedIterator<Item = &Phase> {
         self.phases.iter().filter(move |phase| phase.kind == kind)
     }
 
@@ -149,17 +156,22 @@ impl PhasedMotion {
     /// Whether `arm` can carry it out from `ready`, with its tip at `from` and `to` at both ends of the contact, to within a
     /// tenth of a millimetre.
     pub fn leads(&self, arm: &Arm, ready: &Joints, from: Point, to: Point) -> bool {
+        self.leads_in(PhaseKind::Contact, arm, ready, from, Some(to))
+    }
+
+    /// The same for the phases of a kind; where no end is named any will do.
+    pub fn leads_in(&self, kind: PhaseKind, arm: &Arm, ready: &Joints, from: Point, to: Option<Point>) -> bool {
         const SAME_M: f64 = 1e-4;
         let tip = |joints: Option<Joints>| joints.map(|joints| arm.world_from_tool(&joints).translation.vector);
         let at = |joints: Option<Joints>, point: Point| {
             tip(joints).is_some_and(|tip| (tip - point.coords.map(f64::from)).norm() < SAME_M)
         };
         let fits = |motion: &Motion| motion.stops.iter().all(|stop| stop.joints.len() == arm.joints.len());
-        let contact = || self.of_kind(PhaseKind::Contact).map(|phase| &phase.motion);
+        let of_kind = || self.of_kind(kind).map(|phase| &phase.motion);
         self.phases.iter().all(|phase| fits(&phase.motion) && phase.opening_m == 0.0)
             && self.start() == Some(*ready)
-            && at(contact().next().and_then(|contact| contact.at(0.0)), from)
-            && at(contact().next_back().and_then(|contact| contact.at(contact.duration_s())), to)
+            && at(of_kind().next().and_then(|first| first.at(0.0)), from)
+            && to.is_none_or(|to| at(of_kind().next_back().and_then(|last| last.at(last.duration_s())), to))
     }
 
     /// Every voxel that the arm touches on the way in or in contact.

@@ -7,8 +7,8 @@
 
 use super::bounds::{reaches, self_pairs};
 use super::cover::{Ball, cover};
-use super::description::{Description, JointElement};
-use super::model::{Arm, Joint, JointKind, Part, Role, identity};
+use super::description::{Description, Geometry, JointElement};
+use super::model::{Arm, Cup, Joint, JointKind, Part, Role, identity};
 use super::tree::{Tree, place};
 use super::{Frame, Joints, MAX_JOINTS, ends, frame_of, shapes};
 use crate::scene::{RobotFile, RobotPlacement};
@@ -18,22 +18,13 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-/// The arm that comes with the program.
-const SHIPPED: &str = include_str!("../../../assets/robots/ur5_2f85.urdf");
-/// Its name in messages.
-const SHIPPED_NAME: &str = "ur5_2f85.urdf";
+/// The link that tells that a hand holds by suction.
+const CUP: &str = "suction_cup";
 
 impl Arm {
     /// The UR5 with a closed Robotiq 2F-85 gripper that comes with the program, where `placement` puts it.
     pub fn standard(placement: &RobotPlacement) -> Self {
-        let file = RobotFile {
-            source: SHIPPED_NAME.to_owned(),
-            text: SHIPPED.to_owned(),
-            meshes: BTreeMap::new(),
-            tool: None,
-            camera: None,
-        };
-        Self::parse(&file, placement).expect("the shipped URDF file is sound")
+        Self::parse(&RobotFile::gripper(), placement).expect("the shipped URDF file is sound")
     }
 
     /// The arm of a placement.
@@ -144,6 +135,7 @@ impl<'r> Reader<'r> {
             last_from_camera,
             tool_link: tool.to_owned(),
             camera_link: camera.map(str::to_owned),
+            cup: self.cup(last, &bodies)?,
             warnings: Vec::new(),
             self_pairs: Vec::new(),
             closed_form: None,
@@ -153,6 +145,23 @@ impl<'r> Reader<'r> {
         arm.self_pairs = self_pairs(&arm);
         arm.warnings = warnings(robot, &moving, &arm);
         Ok(arm)
+    }
+
+    /// The suction cup, if the hand has one.
+    fn cup(&self, last: usize, bodies: &BTreeMap<&str, (usize, Frame)>) -> Result<Option<Cup>> {
+        let Some(link) = self.tree.links.get(CUP) else { return Ok(None) };
+        if bodies.get(CUP).is_none_or(|(body, _)| *body != last) {
+            return self.wrong_link(CUP, "the suction cup must be fixed to the hand");
+        }
+        let radius = |geometry: &Geometry| match geometry {
+            Geometry::Cylinder { radius, .. } => Some(*radius),
+            _ => None,
+        };
+        let radii = link.collisions.iter().filter_map(|collision| radius(&collision.geometry));
+        match radii.fold(None, |widest: Option<f64>, radius| Some(widest.map_or(radius, |widest| widest.max(radius)))) {
+            Some(radius_m) => Ok(Some(Cup { radius_m })),
+            None => self.wrong_link(CUP, "a suction cup has a cylinder as wide as its rim"),
+        }
     }
 
     /// The body that a link belongs to (how many joints of the chain are above it) and its pose in the body's frame.

@@ -11,7 +11,7 @@
 
 mod manipulated;
 
-use super::{Belief, BeliefUpdate, CLASSICAL, FloorPlan, Intervention, Prediction, SOLID};
+use super::{predict_held_apart, Belief, BeliefUpdate, CLASSICAL, FloorPlan, Intervention, Prediction, SOLID};
 use crate::camera::MapObservation;
 use crate::scene::CLASS_COUNT;
 use rayon::prelude::*;
@@ -56,7 +56,9 @@ impl BeliefUpdate for Classical {
 
     fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction> {
         let plan = FloorPlan::new(belief, SOLID);
-        interventions.par_iter().map(|intervention| manipulated::predict(belief, &plan, intervention)).collect()
+        predict_held_apart(belief, interventions, |rest| {
+            rest.par_iter().map(|intervention| manipulated::predict(belief, &plan, intervention)).collect()
+        })
     }
 }
 

@@ -19,6 +19,9 @@ pub struct Intervention {
     /// The straight way of the tool in contact. Swept volume and flow do not tell where in what was swept the tool touched
     /// and from where it came; sigma_m's marks and the reach of the classical rule are made of it.
     pub stroke: Stroke,
+    /// The chance that what moves is held and goes exactly where the flow says, while nothing else moves; `None` where the tool
+    /// pushes or pulls, and what it touches may do anything.
+    pub held: Option<f32>,
 }
 
 /// The straight way of the tool's tip while it is in contact.
@@ -78,6 +81,14 @@ impl Flow {
         let window = Window { x: range(0), y: range(1) };
         let of = |cell: usize| patch.contains(cell).then_some(displacement_m);
         Self { window, displacement_m: window.cells(grid).map(of).collect() }
+    }
+
+    /// An object is taken out of the shelf.
+    pub fn away(grid: &Grid, patch: &Patch) -> Self {
+        let mut flow = Self::rigid(grid, patch, [0.0; 2]);
+        // Farther than any shelf is deep.
+        flow.displacement_m.iter_mut().flatten().for_each(|displacement_m| *displacement_m = [0.0, -1e3]);
+        flow
     }
 
     /// The floor cells of a grid that it leaves and comes to.

@@ -14,7 +14,7 @@ use super::predict::predict;
 use super::push_net::PushNet;
 use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
-use crate::belief::{Belief, BeliefUpdate, Classical, Intervention, NetworksUsed, Prediction, Weights};
+use crate::belief::{predict_held_apart, Belief, BeliefUpdate, Classical, Intervention, NetworksUsed, Prediction, Weights};
 use crate::camera::MapObservation;
 use crate::files::sha256_of_file;
 use crate::grid::Grid;
@@ -219,7 +219,11 @@ impl BeliefUpdate for Cnabu {
     fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction> {
         let classical = || Classical.predict(belief, interventions);
         let Ok(layout) = Layout::new(&belief.grid) else { return classical() };
-        predict(&self.pool, &layout, &self.planes_of(&layout, belief), belief, interventions).unwrap_or_else(classical)
+        let asked = |rest: &[Intervention]| {
+            predict(&self.pool, &layout, &self.planes_of(&layout, belief), belief, rest)
+                .unwrap_or_else(|| Classical.predict(belief, rest))
+        };
+        predict_held_apart(belief, interventions, asked)
     }
 }
 

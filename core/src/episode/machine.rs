@@ -3,7 +3,7 @@
 use super::estimate::{Estimate, Told, sense};
 use super::judgement::{Judgement, Prior, entropy_nats};
 use super::record::{
-    EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
+    EpisodeConfig, EpisodeRecord, FORMAT, GripReport, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
 };
 use super::stopwatch::Stopwatch;
 use crate::arm::{Arm, ArmTool, HandPose, Motion, PhasedMotion};
@@ -58,6 +58,7 @@ impl Episode {
         config: EpisodeConfig,
         update: Arc<dyn BeliefUpdate>,
     ) -> Result<Self> {
+        let scene = scene.with_hand_for(config.policy.picks());
         // Before the scene is given the time to settle.
         check(&scene, &config, &*update)?;
         let environment = Box::new(Simulated::new(&scene, &catalog)?);
@@ -84,6 +85,10 @@ impl Episode {
         }
         let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
+        if policy.picks() && arm.arm.cup.is_none() {
+            let message = format!("policy {policy} takes objects by suction, and the hand of {} has no cup; choose --arm suction", arm.arm.name);
+            return Err(Error::Usage(message));
+        }
         let hands = Arc::new(views.hand_poses(&arm));
         let unreachable = Arc::new(views.unreachable(&hands));
         let estimate = Estimate::uniform(&scene.grid());
@@ -316,6 +321,10 @@ impl Episode {
             contacts: outcome.link_contacts.iter().map(touch).collect(),
             against_wall: outcome.against_wall.iter().map(|id| self.name(*id)).collect(),
             arm_in_shelf_m: outcome.arm_in_shelf_m,
+            grip: outcome.grip.map(|grip| GripReport {
+                object: grip.object.map(|id| self.name(id)),
+                end: grip.end,
+            }),
         }
     }
 
@@ -465,8 +474,9 @@ impl Episode {
         let config = &self.record.config;
         let actions = self.history.actions.len();
         let (seen, sampler) = (config.planner.counted.left_out(self.seen()), config.planner.push_sampler);
-        let ground = Ground { belief: self.belief(), seen, arm: &self.arm, sampler };
-        plan::draw_candidates(&config.planner, &ground, config.seed, actions)
+        let planner = config.policy.settings(&config.planner);
+        let ground = Ground { belief: self.belief(), seen, arm: &self.arm, sampler, place: planner.place };
+        plan::draw_candidates(&planner, &ground, config.seed, actions)
     }
 
     /// How the belief changes.

@@ -9,7 +9,7 @@ use crate::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, Rule};
 use crate::scene::Scene;
 use crate::score::{ObjectVerdict, Scores};
 use crate::skill::SweptManipulation;
-use crate::world::ManipulationOutcome;
+use crate::world::{GripEnd, ManipulationOutcome};
 use serde::{Deserialize, Serialize};
 
 /// The format number of `episode.json`. In format 1, which is still read, every episode had a truth, and `entropy_nats`
@@ -159,6 +159,18 @@ pub struct PushReport {
     pub against_wall: Vec<String>,
     /// How deep the arm got into a panel of the shelf at most, metres.
     pub arm_in_shelf_m: f32,
+    /// What became of what the cup was to hold; `None` of a manipulation without suction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grip: Option<GripReport>,
+}
+
+/// What became of what the cup was to hold.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GripReport {
+    /// The object that it sealed on, `class#id`, if it did.
+    pub object: Option<String>,
+    /// How it ended.
+    pub end: GripEnd,
 }
 
 /// A link that touched an object.

@@ -43,7 +43,8 @@ impl Decision {
             Reason::TooEarly => steps("first", settings.quiet_steps),
             Reason::LastStep => steps("last", settings.closing_steps),
             Reason::JustPushed
-                if matches!(policy, PolicyKind::Mem | PolicyKind::ClairvoyantPush) && settings.closing_steps > 1 =>
+                if matches!(policy, PolicyKind::Mem | PolicyKind::MemPick | PolicyKind::ClairvoyantPush)
+                    && settings.closing_steps > 1 =>
             {
                 format!("{} looks follow a push before the next one", settings.closing_steps)
             }
@@ -60,7 +61,7 @@ impl Decision {
         let Rule { policy, settings } = self.ruled_by();
         let pushes = matches!(self.action, Action::Manipulate(_));
         match policy {
-            PolicyKind::Mem | PolicyKind::ClairvoyantPush => "the policy's schedule says so".to_owned(),
+            PolicyKind::Mem | PolicyKind::MemPick | PolicyKind::ClairvoyantPush => "the policy's schedule says so".to_owned(),
             PolicyKind::MemNoPush => "it is the best view, and the policy never pushes".to_owned(),
             PolicyKind::Random | PolicyKind::RandomCnabu => "the policy draws its views at random".to_owned(),
             PolicyKind::RandomPush5 | PolicyKind::RandomPush5Blind | PolicyKind::RandomViewPush5 if pushes => {
@@ -68,6 +69,15 @@ impl Decision {
             }
             PolicyKind::RandomPush5 | PolicyKind::RandomPush5Blind => {
                 format!("it is the best view, and the policy pushes in every {PUSH_EVERY}th step only")
+            }
+            PolicyKind::RandomPick5 if pushes => {
+                format!("the policy picks something at random in every {PUSH_EVERY}th step")
+            }
+            PolicyKind::GreedyFrontPick if pushes => {
+                format!("the policy picks what stands nearest to the entrance in every {PUSH_EVERY}th step")
+            }
+            PolicyKind::RandomPick5 | PolicyKind::GreedyFrontPick => {
+                format!("it is the best view, and the policy picks in every {PUSH_EVERY}th step only")
             }
             PolicyKind::RandomViewPush5 => {
                 format!("the policy draws its views at random, and pushes in every {PUSH_EVERY}th step only")

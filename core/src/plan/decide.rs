@@ -1,7 +1,7 @@
 //! From a situation to the next action.
 
 use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
-use super::weigh::{Weighed, random_push, weigh_clairvoyantly, weigh_pushes};
+use super::weigh::{Weighed, front_most, random_push, weigh_clairvoyantly, weigh_pushes};
 use super::{Action, Counted, Decision, Gain, PlannerSettings, PolicyKind, Reason, Rule, Situation};
 use crate::belief::Belief;
 use crate::camera::ViewId;
@@ -15,6 +15,7 @@ use rayon::prelude::*;
 /// Gains of all views and the best pair are weighed whatever the policy makes of them, so that decisions of different
 /// policies compare. Pushes are drawn and predicted only where the policy may push now.
 pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situation<'_>) -> Decision {
+    let settings = &policy.settings(settings);
     let (history, views) = (situation.history, situation.views);
     let step = history.actions.len();
     let gain = Gain::new(settings.counted, situation.belief, situation.seen);
@@ -31,7 +32,7 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
     let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
     let guard = || push_guard(history, situation.budget, complete(), settings);
     match policy {
-        PolicyKind::Mem | PolicyKind::ClairvoyantPush => {
+        PolicyKind::Mem | PolicyKind::MemPick | PolicyKind::ClairvoyantPush => {
             if let (Counted::All, true, Some(view)) = (gain.counted(), history.just_pushed(), history.view_of_push) {
                 decision.action = Action::Look { view };
                 decision.reason = Reason::ViewOfPush;
@@ -49,12 +50,19 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         }
         PolicyKind::MemNoPush => (),
         PolicyKind::Random | PolicyKind::RandomCnabu => decision.action = random_look(situation),
-        PolicyKind::RandomPush5 | PolicyKind::RandomPush5Blind | PolicyKind::RandomViewPush5 => {
+        PolicyKind::RandomPush5
+        | PolicyKind::RandomPush5Blind
+        | PolicyKind::RandomViewPush5
+        | PolicyKind::RandomPick5
+        | PolicyKind::GreedyFrontPick => {
             if policy == PolicyKind::RandomViewPush5 {
                 decision.action = random_look(situation);
             }
             if (step + 1).is_multiple_of(PUSH_EVERY) {
-                push_at_random(&mut decision, situation, settings, guard());
+                match policy {
+                    PolicyKind::GreedyFrontPick => take_front_most(&mut decision, situation, settings, guard()),
+                    _ => push_at_random(&mut decision, situation, settings, guard()),
+                }
             }
         }
         PolicyKind::Saturation => {
@@ -125,7 +133,23 @@ fn push_at_random(
         decision.reason = reason;
         return;
     }
-    if let Some(at) = take_over(decision, random_push(situation, settings.skills)) {
+    if let Some(at) = take_over(decision, random_push(situation, settings)) {
+        decision.action = Action::Manipulate(decision.candidates[at].manipulation);
+    }
+}
+
+/// Replaces the look by the feasible manipulation that touches nearest to the entrance, if nothing forbids it and there is one.
+fn take_front_most(
+    decision: &mut Decision,
+    situation: &Situation<'_>,
+    settings: &PlannerSettings,
+    guard: Option<Reason>,
+) {
+    if let Some(reason) = guard {
+        decision.reason = reason;
+        return;
+    }
+    if let Some(at) = take_over(decision, front_most(situation, settings)) {
         decision.action = Action::Manipulate(decision.candidates[at].manipulation);
     }
 }

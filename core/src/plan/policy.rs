@@ -1,7 +1,9 @@
 //! The policies by name, and what each of them does.
 
 use crate::belief::{CLASSICAL, CNABU};
+use super::PlannerSettings;
 use crate::named;
+use crate::skill::{SkillKind, SkillSet};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -30,6 +32,13 @@ pub enum PolicyKind {
     RandomViewPush5,
     /// Best views; a random push when two consecutive gains differ by less than 2 %.
     Saturation,
+    /// As [`Self::Mem`], and the arm may also pick: it takes objects by suction and sets them down elsewhere.
+    MemPick,
+    /// Best views; a random pick, predicted, every 5th step.
+    #[serde(rename = "random-pick-5")]
+    RandomPick5,
+    /// Best views; every 5th step it picks what stands nearest to the entrance.
+    GreedyFrontPick,
     /// Clairvoyant: the view whose real observation cuts the entropy most; never a push.
     Oracle,
     /// Clairvoyant: as [`Self::Mem`], but pushes are carried out in copies of the world beforehand, and the one that really
@@ -39,7 +48,7 @@ pub enum PolicyKind {
 
 impl PolicyKind {
     /// Every policy, in the order of the table in METHOD.md.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 13] = [
         Self::Mem,
         Self::MemNoPush,
         Self::RandomCnabu,
@@ -48,6 +57,9 @@ impl PolicyKind {
         Self::RandomPush5Blind,
         Self::RandomViewPush5,
         Self::Saturation,
+        Self::MemPick,
+        Self::RandomPick5,
+        Self::GreedyFrontPick,
         Self::Oracle,
         Self::ClairvoyantPush,
     ];
@@ -63,6 +75,9 @@ impl PolicyKind {
             Self::RandomPush5Blind => "random-push-5-blind",
             Self::RandomViewPush5 => "random-view-push-5",
             Self::Saturation => "saturation",
+            Self::MemPick => "mem-pick",
+            Self::RandomPick5 => "random-pick-5",
+            Self::GreedyFrontPick => "greedy-front-pick",
             Self::Oracle => "oracle",
             Self::ClairvoyantPush => "clairvoyant-push",
         }
@@ -81,6 +96,21 @@ impl PolicyKind {
     /// Whether the policy draws at random (views, pushes, push candidates). The others do the same for every seed.
     pub fn is_seeded(self) -> bool {
         !matches!(self, Self::MemNoPush | Self::Oracle)
+    }
+
+    /// Whether it takes objects by suction, so that the hand needs a cup.
+    pub fn picks(self) -> bool {
+        matches!(self, Self::MemPick | Self::RandomPick5 | Self::GreedyFrontPick)
+    }
+
+    /// The settings with the skills that the policy is about.
+    pub fn settings(self, settings: &PlannerSettings) -> PlannerSettings {
+        let skills = match self {
+            Self::MemPick => SkillSet::of(&[SkillKind::Push, SkillKind::Pick]),
+            Self::RandomPick5 | Self::GreedyFrontPick => SkillSet::of(&[SkillKind::Pick]),
+            _ => settings.skills,
+        };
+        PlannerSettings { skills, ..*settings }
     }
 
     /// Name of the belief update that the policy is published with.

@@ -5,7 +5,7 @@
 
 use super::Counted;
 use crate::belief::{CERTAIN, CLASSICAL, CNABU, COMPLETE_SHARE};
-use crate::skill::{PushSampler, SkillKind, SkillSet};
+use crate::skill::{PickPlace, PushSampler, SkillKind, SkillSet};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -92,6 +92,9 @@ const COUNTED: [Choice; 2] =
 const SAMPLERS: [Choice; 2] =
     [Choice { name: "frontier", label: "at the frontier" }, Choice { name: "hidden", label: "before the hidden" }];
 
+const PLACES: [Choice; 2] =
+    [Choice { name: "shelf", label: "in the shelf" }, Choice { name: "tray", label: "beside the robot" }];
+
 /// Makes [`PlannerSettings`], its defaults where all and where only unseen voxels count, and [`SETTINGS`] of one list.
 macro_rules! planner_settings {
     ($($field:ident: $type:ty = [$all:expr, $unseen:expr], $place:ident, $name:literal, $label:literal, $unit:literal,
@@ -166,6 +169,9 @@ planner_settings! {
         (SAMPLERS of PushSampler, |settings, sampler| settings.push_sampler = sampler),
         "Where push candidates are drawn: at the frontier, as in the paper, or at what stands before space that no look has \
          seen; policies that push at random draw at the frontier all the same";
+    place: PickPlace = [PickPlace::Shelf, PickPlace::Shelf], Form, "place", "picks go", "", "shelf|tray",
+        (PLACES of PickPlace, |settings, place| settings.place = place),
+        "Where an object that is picked is set down: in the shelf, where it is seen free, or on a table beside the robot";
     gamma: f32 = [GAMMA, GAMMA], Form, "gamma", "γ", "", "X",
         (real 0.0 to 10.0 by 0.01),
         "Weight of the disturbance term: look if IGV > IGM + gamma Reg (the paper gives no number)";

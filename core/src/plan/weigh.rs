@@ -5,7 +5,7 @@ use super::{CandidateRecord, Gain, PlannerSettings, Situation};
 use crate::arm::PhasedMotion;
 use crate::belief::{Belief, FloorPlan, Intervention, Prediction, SOLID};
 use crate::rng::stream;
-use crate::skill::{Candidate, Ground, PushSampler, PushTruth, SkillSet, random_candidate};
+use crate::skill::{Candidate, Ground, PushSampler, PushTruth, random_candidate};
 use rayon::prelude::*;
 
 /// The pushes that were weighed.
@@ -99,12 +99,23 @@ pub(super) fn weigh_clairvoyantly(
 
 /// Draws one feasible manipulation at random, pushes from the frontier as in the paper, with those that were rejected on the
 /// way.
-pub(super) fn random_push(situation: &Situation<'_>, skills: SkillSet) -> Weighed {
+pub(super) fn random_push(situation: &Situation<'_>, settings: &PlannerSettings) -> Weighed {
     let (belief, arm, actions) = (situation.belief, situation.arm, situation.history.actions.len());
-    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier };
-    let drawn = random_candidate(skills, &ground, situation.seed, actions);
+    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier, place: settings.place };
+    let drawn = random_candidate(settings.skills, &ground, situation.seed, actions);
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
+    let motions = drawn.into_iter().map(|drawn| drawn.motion).collect();
+    Weighed { candidates, best, motions }
+}
+
+/// Draws candidates, of which the best is the feasible one that touches nearest to the entrance, the first of equals.
+pub(super) fn front_most(situation: &Situation<'_>, settings: &PlannerSettings) -> Weighed {
+    let actions = situation.history.actions.len();
+    let drawn = draw_candidates(settings, &situation.ground(settings), situation.seed, actions);
+    let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
+    let depth = |at: &usize| drawn[*at].contact.y;
+    let best = (0..drawn.len()).filter(|at| drawn[*at].rejection.is_none()).min_by_key(depth);
     let motions = drawn.into_iter().map(|drawn| drawn.motion).collect();
     Weighed { candidates, best, motions }
 }

@@ -80,6 +80,32 @@ pub struct RobotFile {
 }
 
 impl RobotFile {
+    /// The UR5 with a closed Robotiq 2F-85 gripper that comes with the program.
+    pub fn gripper() -> Self {
+        Self::shipped("ur5_2f85.urdf", include_str!("../../../assets/robots/ur5_2f85.urdf"))
+    }
+
+    /// The UR5 with a suction cup that comes with the program.
+    pub fn suction() -> Self {
+        Self::shipped("ur5_suction.urdf", include_str!("../../../assets/robots/ur5_suction.urdf"))
+    }
+
+    fn shipped(source: &str, text: &str) -> Self {
+        Self { source: source.to_owned(), text: text.to_owned(), meshes: BTreeMap::new(), tool: None, camera: None }
+    }
+
+    /// The arm that a person names: `gripper` or `suction` of those that come with the program, else a URDF file.
+    ///
+    /// # Errors
+    /// Those of [`RobotFile::read`].
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "gripper" => Ok(Self::gripper()),
+            "suction" => Ok(Self::suction()),
+            file => Self::read(Path::new(file), file),
+        }
+    }
+
     /// Reads a URDF file and the collision meshes that it names; `source` is what it is called from then on.
     ///
     /// # Errors

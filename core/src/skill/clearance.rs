@@ -31,7 +31,7 @@ const ATTEMPTS: usize = 3;
 /// A query that only tries straight ways.
 const STRAIGHT: PlanSettings = PlanSettings { rounds: 0, shortcuts: 0 };
 /// Work of one query: what takes long to plan is what another manipulation can replace.
-const QUERY: PlanSettings = PlanSettings { rounds: 40, shortcuts: 10 };
+pub(super) const QUERY: PlanSettings = PlanSettings { rounds: 40, shortcuts: 10 };
 
 /// A straight contact that the arm is to carry out.
 pub struct Approach<'a> {
@@ -106,6 +106,11 @@ impl<'a> ArmClearance<'a> {
     /// Where something stands that the arm keeps away from.
     pub fn plan(&self) -> &FloorPlan {
         &self.plan
+    }
+
+    /// Whether a voxel is likely occupied, so that the arm keeps away from it.
+    pub(super) fn is_avoided(&self, voxel: usize) -> bool {
+        self.avoided.contains(voxel)
     }
 
     /// The belief's grid.
@@ -204,7 +209,7 @@ impl<'a> ArmClearance<'a> {
     }
 
     /// What the gripper meets that it may not touch when it is moved along `travel`, and the share of the way until there.
-    fn gripper_hit(&self, from: &Frame, travel: &Vector3<f64>, touches: Option<&Patch>) -> (f64, Option<Hit>) {
+    pub(super) fn gripper_hit(&self, from: &Frame, travel: &Vector3<f64>, touches: Option<&Patch>) -> (f64, Option<Hit>) {
         let height = self.grid.dims[2];
         let may_touch = |index: usize| touches.is_some_and(|patch| patch.contains(index / height));
         let blocks = |index: usize| self.confident.contains(index) && !may_touch(index);

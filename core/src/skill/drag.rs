@@ -219,7 +219,7 @@ impl Skill for Drag {
     fn intervention(&self, belief: &Belief, solid: &FloorPlan, mut swept: VoxelSet) -> Intervention {
         let (grid, stroke) = (&belief.grid, self.stroke());
         let Some((first, target)) = self.target(solid, grid) else {
-            return Intervention { swept, flow: Flow::nothing(), stroke };
+            return Intervention { swept, flow: Flow::nothing(), stroke, held: None };
         };
         let backs = Backs { belief, plan: solid };
         let over_m = overhang_m(backs.top_m(first), self.start[2] - grid.origin[2], self.pitch_deg);
@@ -231,7 +231,7 @@ impl Skill for Drag {
         for cell in (0..grid.cell_count()).filter(|cell| moved.source(*cell).is_some() || over(cell)) {
             grid.column(cell).for_each(|voxel| swept.remove(voxel));
         }
-        Intervention { swept, flow, stroke }
+        Intervention { swept, flow, stroke, held: None }
     }
 
     fn way_m(&self) -> f32 {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::skill::PickPlace;
 use crate::arm::ArmTool;
 use crate::belief::{BeliefUpdate, Classical, evidence};
 use crate::rng::stream;
@@ -36,7 +37,7 @@ fn arm() -> ArmTool {
 }
 
 fn drawn(belief: &Belief, arm: &ArmTool) -> Vec<Candidate> {
-    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier };
+    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier, place: PickPlace::Shelf };
     SkillKind::Drag.sample(&ground, 6, &mut stream(1, "drags", 0))
 }
 

@@ -31,9 +31,7 @@ impl Manipulation {
     pub fn done(&self, outcome: &ManipulationOutcome, arm: &Arm, grid: &Grid) -> SweptManipulation {
         let mut swept = VoxelSet::empty(grid);
         arm.sweep(&outcome.passed, grid, &mut swept);
-        let skill = self.skill();
-        let way_m = if outcome.stalled { outcome.way_m.min(skill.way_m()) } else { skill.way_m() };
-        SweptManipulation { manipulation: skill.shortened(way_m), swept }
+        SweptManipulation { manipulation: self.skill().done(outcome), swept }
     }
 }
 

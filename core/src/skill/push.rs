@@ -56,7 +56,7 @@ impl SweptPush {
     /// ([`SOLID`](crate::belief::SOLID)).
     pub fn intervention(&self, belief: &Belief, solid: &FloorPlan) -> Intervention {
         let (stroke, swept) = (self.push.stroke(), self.swept.clone());
-        Intervention { flow: carried_along(belief, solid, &swept, &stroke), swept, stroke }
+        Intervention { flow: carried_along(belief, solid, &swept, &stroke), swept, stroke, held: None }
     }
 }
 

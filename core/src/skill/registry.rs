@@ -1,6 +1,7 @@
 //! The list of skills.
 
 use super::drag::Drag;
+use super::pick::Pick;
 use super::push::Push;
 use super::{Candidate, Ground, Skill};
 use crate::rng::ChaCha8Rng;
@@ -93,6 +94,7 @@ macro_rules! skills {
 skills! {
     Push(Push): "push", "pushes", "pushes";
     Drag(Drag): "drag", "drags", "drags";
+    Pick(Pick): "pick", "picks", "picks";
 }
 
 impl SkillKind {
@@ -210,7 +212,7 @@ mod tests {
     #[test]
     fn a_skill_that_this_program_lacks_is_named_with_those_it_has() {
         let error = serde_json::from_value::<Manipulation>(json!({ "kind": "fly", "start": [0, 0, 0] }));
-        assert_eq!(error.expect_err("no skill").to_string(), "this program has no skill `fly`; it has push, drag");
+        assert_eq!(error.expect_err("no skill").to_string(), "this program has no skill `fly`; it has push, drag, pick");
         let error = serde_json::from_value::<Manipulation>(json!({ "kind": "push", "start": [0, 0, 0] }));
         assert!(error.expect_err("incomplete").to_string().starts_with("push: missing field"));
     }

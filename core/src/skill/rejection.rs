@@ -23,6 +23,14 @@ pub enum Rejection {
         #[serde(flatten)]
         hit: Hit,
     },
+    /// The hand has no suction cup.
+    NoCup,
+    /// A cup fits nowhere on its front: an edge, a gap, too small or too steep a face.
+    NoFace,
+    /// Something stands before it, or the shelf is too low to lift it.
+    NoWayOut,
+    /// No place is seen free where it could be set down.
+    NoPlace,
     /// The arm could be there, but no path from the waiting configuration was found.
     NoWay,
 }
@@ -34,6 +42,10 @@ impl Rejection {
             Self::NoTarget => format!("nothing likely to {} is near", skill.name()),
             Self::Unreachable { stage } => format!("out of the arm's reach {}", stage.words(skill)),
             Self::ArmBlocked { stage, hit } => format!("{}, {hit}", stage.words(skill)),
+            Self::NoCup => "the hand has no suction cup".to_owned(),
+            Self::NoFace => "the cup fits nowhere on its front".to_owned(),
+            Self::NoWayOut => "something is in its way out of the shelf".to_owned(),
+            Self::NoPlace => "no place is seen free where it could be set down".to_owned(),
             Self::NoWay => "no free way to the start was found".to_owned(),
         }
     }

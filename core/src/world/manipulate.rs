@@ -15,11 +15,34 @@ pub struct LinkContact {
     pub object: ObjectId,
 }
 
+/// What became of what the cup was to hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Grip {
+    /// The object that it sealed on, if it did.
+    pub object: Option<ObjectId>,
+    /// How it ended.
+    pub end: GripEnd,
+}
+
+/// How holding an object ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GripEnd {
+    /// The cup did not seal: an edge, a gap, too small a face, or nothing there.
+    NoSeal,
+    /// It came off on the way, pulled or bent with more than the cup bears, or the arm was blocked.
+    CameOff,
+    /// It was set down where it was to be.
+    SetDown,
+    /// It was laid down beside the robot.
+    Stowed,
+}
+
 /// How a motion ended.
 struct Ride {
     /// The last configuration.
     joints: Joints,
-    /// When the arm was blocked, seconds since the motion began.
+    /// When the arm stopped, since it was blocked or lost what it held, seconds since the motion began.
     blocked_s: Option<f64>,
 }
 
@@ -40,23 +63,42 @@ impl World {
         let tip = |joints: &Joints| arm.world_from_tool(joints).translation.vector;
         let (mut stalled, mut way_m, mut last) = (false, 0.0, first);
         let mut back: Vec<Joints> = Vec::new();
+        let mut grip: Option<Grip> = None;
         for phase in motion.outward() {
             let start = phase.motion.at(0.0).unwrap_or(last);
+            if phase.kind == PhaseKind::Stow {
+                self.stow();
+                grip = grip.map(|grip| Grip { end: GripEnd::Stowed, ..grip });
+            }
+            if phase.kind == PhaseKind::Carry && grip.is_none() {
+                let sealed = self.physics.sealed_on(arm, &last);
+                let object = sealed.and_then(|at| self.bodies.get(at)).map(|body| body.id);
+                grip = Some(Grip { object, end: sealed.map_or(GripEnd::NoSeal, |_| GripEnd::SetDown) });
+                match sealed {
+                    Some(at) => self.physics.hold(at),
+                    None => break,
+                }
+            }
             let ride = self.ride(arm, &phase.motion, &mut notes);
             last = ride.joints;
             back.extend(before_time(&phase.motion, ride.blocked_s));
-            if phase.kind == PhaseKind::Contact {
+            if matches!(phase.kind, PhaseKind::Contact | PhaseKind::Carry) {
                 way_m += (tip(&last) - tip(&start)).norm() as f32;
             }
             if ride.blocked_s.is_some() {
-                stalled = true;
+                match &mut grip {
+                    Some(grip) => grip.end = GripEnd::CameOff,
+                    None => stalled = true,
+                }
                 break;
             }
         }
+        self.physics.let_go();
+        let is_done = !stalled && grip.is_none_or(|grip| matches!(grip.end, GripEnd::SetDown | GripEnd::Stowed));
         back.push(last);
         let passed = back.clone();
         back.reverse();
-        let planned = motion.retreat().filter(|_| !stalled);
+        let planned = motion.retreat().filter(|_| is_done);
         let way_back = planned.unwrap_or_else(|| Motion::along(arm, &back, crate::arm::WAY_BACK_M_S));
         // An arm that cannot even go back is taken away where it is: a real one would give way.
         self.ride(arm, &way_back, &mut notes);
@@ -70,6 +112,7 @@ impl World {
         outcome.link_contacts = notes.contacts;
         outcome.against_wall = notes.against_wall;
         outcome.arm_in_shelf_m = notes.arm_in_shelf_m;
+        outcome.grip = grip;
         outcome.passed = passed;
         outcome.arm_s = notes.steps as f32 * TIME_STEP_S;
         outcome
@@ -93,7 +136,7 @@ impl World {
         for step in 1..=steps {
             let at_s = step as f64 * f64::from(TIME_STEP_S);
             joints = motion.at(at_s).unwrap_or(joints);
-            let blocked = self.physics.step_arm(arm, &joints);
+            let blocked = self.physics.step_arm(arm, &joints) || self.physics.comes_off(arm, &joints);
             notes.steps += 1;
             self.take_notes(notes);
             if blocked && step < steps {

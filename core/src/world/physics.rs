@@ -3,6 +3,10 @@
 //! Lengths here are tenths of metres and less, so rapier's `length_unit` is 0.1: contact margins, correction speeds
 //! and sleeping thresholds scale with it, and objects that are squeezed come apart at 0.3 m/s and do not explode.
 
+mod suction;
+
+pub use suction::{BEND_NM, PULL_N, STROKE_M};
+
 use super::hull::Hull;
 use super::shelf_panels;
 use crate::arm::{Arm, Joints, Role, pose_of};
@@ -62,6 +66,8 @@ pub(super) struct Physics {
     panels: Vec<ColliderHandle>,
     blocked_steps: u32,
     steps: u64,
+    /// What the cup holds while it does.
+    held: Option<suction::Held>,
 }
 
 impl Clone for Physics {
@@ -89,6 +95,7 @@ impl Clone for Physics {
             panels: self.panels.clone(),
             blocked_steps: self.blocked_steps,
             steps: self.steps,
+            held: self.held.clone(),
         }
     }
 }
@@ -114,7 +121,7 @@ impl Physics {
             panels.push(world.insert_collider(collider, None));
         }
         let handles = bodies.iter().map(|body| insert_body(&mut world, body)).collect();
-        Self { world, handles, arm: Vec::new(), panels, blocked_steps: 0, steps: 0 }
+        Self { world, handles, arm: Vec::new(), panels, blocked_steps: 0, steps: 0, held: None }
     }
 
     /// Starts an action. Workspaces are renewed, so that a clone, which cannot copy them, starts from the same state.
@@ -213,6 +220,9 @@ impl Physics {
             if let Some(rigid) = self.world.bodies.get_mut(body.handle) {
                 rigid.set_next_kinematic_position(to_rapier_pose(&pose_of(&poses[body.number])));
             }
+        }
+        if let Some(at) = self.held() {
+            self.world.wake_up(self.handles[at], true);
         }
         self.step();
         let parts = self.arm.iter().flat_map(|body| &body.parts);

@@ -53,6 +53,8 @@ fn times(outcome: &StepOutcome, end: f64) -> Vec<facts::Fact> {
             let (name, hint) = match phase.kind {
                 PhaseKind::Approach => ("approach", "From where the arm waits to where the contact begins"),
                 PhaseKind::Contact => (done.kind().name(), "In contact"),
+                PhaseKind::Carry => ("carry", "With the object in hand: out of the shelf and to where it is set down"),
+                PhaseKind::Stow => ("lay down", "The object is laid down beside the robot"),
                 PhaseKind::Retreat => ("retreat", "Back to where the arm waits"),
             };
             facts.push(fact(name, seconds(phase.motion.duration_s()), hint));

@@ -1,0 +1,163 @@
+//! The arm's motion for a pick: in, out with the object, to where it is set down, and back.
+
+use super::{OUT, Pick};
+use crate::arm::{
+    CARRY_M_S, Follow, Frame, Joints, Motion, Phase, PhaseKind, PhasedMotion, Space, WAY_BACK_M_S, follow_line, level_tool,
+    plan,
+};
+use crate::belief::Patch;
+use crate::rng::ChaCha8Rng;
+use crate::skill::clearance::{Approach, ArmClearance, QUERY};
+use crate::skill::{Rejection, Stage};
+use nalgebra::Vector3;
+use std::f64::consts::FRAC_PI_2;
+
+pub use super::room::LIFT_M;
+
+/// How far the cup is pressed on beyond where the belief has the front, metres: half of what the bellows gives way.
+pub const PRESS_M: f32 = 0.004;
+/// How far above the board an object is let go, metres: what is lowered farther would be pressed on the board.
+pub const GAP_M: f32 = 0.001;
+/// How far the cup goes along its own axis at the end of its way in, metres.
+const ALONG_AXIS_M: f64 = 0.03;
+/// How far before the front edge the back of an object must come to be out of the shelf, metres.
+const OUT_M: f64 = 0.02;
+/// How finely a turn of the whole arm is checked, radians.
+const TURN_STEP_RAD: f64 = 0.05;
+
+/// A pick being planned.
+struct Carrying<'a> {
+    clearance: &'a ArmClearance<'a>,
+    space: Space<'a>,
+    target: &'a Patch,
+    /// The way of the object in hand.
+    path: Vec<Joints>,
+}
+
+/// The arm's motion for a pick of an object, or why there is none.
+pub(super) fn motion(
+    pick: &Pick,
+    clearance: &ArmClearance<'_>,
+    target: &Patch,
+    rng: &mut ChaCha8Rng,
+) -> Result<PhasedMotion, Rejection> {
+    let tool = clearance.tool();
+    let arm = &tool.arm;
+    let Some(ready) = tool.ready else { return Err(Rejection::Unreachable { stage: Stage::Start }) };
+    if arm.cup.is_none() {
+        return Err(Rejection::NoCup);
+    }
+    let press = (pick.touch() + pick.ahead() * PRESS_M).map(f64::from);
+    let touch = level_tool(&press, pick.yaw_rad());
+    let up = f64::from(LIFT_M);
+    let approach = Approach {
+        poses: &[touch],
+        travel: Vector3::new(0.0, 0.0, up),
+        lift_m: ALONG_AXIS_M,
+        touches: Some(target),
+        target,
+    };
+    let reached = clearance.motion(&approach, rng)?;
+    let way_in = reached.phases.into_iter().find(|phase| phase.kind == PhaseKind::Approach).ok_or(Rejection::NoWay)?;
+    let start = way_in.motion.path().next_back().ok_or(Rejection::NoWay)?;
+    let mut carrying = Carrying { clearance, space: clearance.space().pushing(), target, path: vec![start] };
+    // Out until the object's back is before the front edge.
+    let grid = clearance.grid();
+    let back = target.cells().iter().map(|cell| cell % grid.dims[1]).max().unwrap_or(0);
+    let out = f64::from((back + 1) as f32 * grid.voxel_m + grid.origin[1]) + OUT_M;
+    carrying.go(Vector3::new(0.0, 0.0, up))?;
+    carrying.go(Vector3::new(0.0, -out, 0.0))?;
+    let mut phases = vec![way_in];
+    match pick.place {
+        Some([dx, dy]) => {
+            let [dx, dy] = [dx, dy].map(f64::from);
+            carrying.go(Vector3::new(dx, 0.0, 0.0))?;
+            carrying.go(Vector3::new(0.0, out + dy, 0.0))?;
+            carrying.go(Vector3::new(0.0, 0.0, -(up + f64::from(GAP_M))))?;
+            phases.push(Phase::closed(PhaseKind::Carry, Motion::along(arm, &carrying.path, CARRY_M_S)));
+            phases.push(Phase::closed(PhaseKind::Retreat, carrying.back(&ready, out + dy, rng)?));
+        }
+        None => {
+            let turned = carrying.aside()?;
+            carrying.path.push(turned);
+            phases.push(Phase::closed(PhaseKind::Carry, Motion::along(arm, &carrying.path, CARRY_M_S)));
+            let there = Motion::along(arm, &[turned, turned], CARRY_M_S);
+            phases.push(Phase::closed(PhaseKind::Stow, there));
+            let free = clearance.space();
+            let planned = plan(&free, &ready, &[vec![turned]], QUERY, rng).ok_or(Rejection::NoWay)?;
+            let path: Vec<Joints> = planned.path.into_iter().rev().collect();
+            phases.push(Phase::closed(PhaseKind::Retreat, Motion::along(arm, &path, WAY_BACK_M_S)));
+        }
+    }
+    Ok(PhasedMotion { phases })
+}
+
+impl Carrying<'_> {
+    fn last(&self) -> Joints {
+        self.path[self.path.len() - 1]
+    }
+
+    /// Moves the object straight on.
+    fn go(&mut self, travel: Vector3<f64>) -> Result<(), Rejection> {
+        let arm = &self.clearance.tool().arm;
+        let pose = arm.world_from_tool(&self.last());
+        if let (_, Some(hit)) = self.clearance.gripper_hit(&pose, &travel, Some(self.target)) {
+            return Err(Rejection::ArmBlocked { stage: OUT, hit });
+        }
+        let mut met = None;
+        let Follow { path, complete } = follow_line(arm, &self.last(), &travel, |joints| {
+            met = self.space.hit(joints);
+            met.is_none()
+        });
+        if !complete {
+            return Err(met.map_or(Rejection::Unreachable { stage: OUT }, |hit| Rejection::ArmBlocked { stage: OUT, hit }));
+        }
+        self.path.extend(path.into_iter().skip(1));
+        Ok(())
+    }
+
+    /// Turns the whole arm by a quarter about its first joint, to the side that is free: beside the robot.
+    fn aside(&self) -> Result<Joints, Rejection> {
+        let arm = &self.clearance.tool().arm;
+        let from = self.last();
+        let mut met = Rejection::Unreachable { stage: OUT };
+        for quarter in [-FRAC_PI_2, FRAC_PI_2] {
+            let steps = (FRAC_PI_2 / TURN_STEP_RAD).ceil() as usize;
+            let turned = |step: usize| {
+                let mut joints = from;
+                joints[0] += quarter * step as f64 / steps as f64;
+                joints
+            };
+            let fault = (1..=steps).map(turned).find_map(|joints| {
+                let hit = self.space.hit(&joints).map(|hit| Rejection::ArmBlocked { stage: OUT, hit });
+                hit.or_else(|| (!arm.within_limits(&joints)).then_some(Rejection::Unreachable { stage: OUT }))
+            });
+            match fault {
+                None => return Ok(turned(steps)),
+                Some(fault) => met = fault,
+            }
+        }
+        Err(met)
+    }
+
+    /// Back to where the arm waits, from where it let go: along the cup's own axis, then straight out.
+    fn back(&self, ready: &Joints, out: f64, rng: &mut ChaCha8Rng) -> Result<Motion, Rejection> {
+        let arm = &self.clearance.tool().arm;
+        let start = self.last();
+        let pose: Frame = arm.world_from_tool(&start);
+        let drawn = pose.rotation * Vector3::new(0.0, 0.0, -ALONG_AXIS_M);
+        let mut chain = vec![start];
+        for travel in [drawn, Vector3::new(0.0, -(out + drawn.y).max(0.0), 0.0)] {
+            let from = chain[chain.len() - 1];
+            let follow = follow_line(arm, &from, &travel, |joints| self.space.is_free(joints));
+            if !follow.complete {
+                return Err(Rejection::NoWay);
+            }
+            chain.extend(follow.path.into_iter().skip(1));
+        }
+        let free = self.clearance.space();
+        let planned = plan(&free, ready, &[chain], QUERY, rng).ok_or(Rejection::NoWay)?;
+        let path: Vec<Joints> = planned.path.into_iter().rev().collect();
+        Ok(Motion::along(arm, &path, WAY_BACK_M_S))
+    }
+}

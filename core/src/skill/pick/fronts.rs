@@ -1,0 +1,170 @@
+//! What can be taken according to a belief: objects that stand first behind the entrance, and where a cup fits on each.
+
+use super::room::Room;
+use super::{Pick, PickPlace};
+use crate::Point;
+use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch};
+use crate::grid::{Cell, Voxel, VoxelSet};
+use crate::skill::{AVOIDED, Rejection};
+use crate::world::STROKE_M;
+
+/// Heights of the cup's middle above the board, metres.
+const HEIGHTS_M: [f32; 2] = [0.03, 0.12];
+/// Heights that are tried, from the middle of the object on, metres.
+const TRIED_M: [f32; 5] = [0.0, 0.02, -0.02, 0.04, -0.04];
+/// Largest tangent of the angle between a front and the entrance's plane: 30 degrees.
+const STEEPEST: f32 = 0.577;
+/// Occupancy probability from which a voxel may be in the way of what is carried: it is not seen free.
+const MAY_BLOCK: f32 = 0.5;
+/// Occupancy probability above which nothing is set down in a voxel.
+const SEEN_FREE: f32 = 0.3;
+/// Occupancy probabilities between which nobody knows what is in a voxel.
+const UNKNOWN: [f32; 2] = [0.1, 0.9];
+
+/// An object with one way to take it.
+pub(super) struct Offer {
+    /// The pick; of an object without a face for the cup the one that would take it by its middle.
+    pub pick: Pick,
+    /// Where it touches.
+    pub contact: Voxel,
+    /// The object.
+    pub target: Patch,
+    /// What is against it before the arm is asked.
+    pub against: Option<Rejection>,
+}
+
+/// A belief prepared for looking for what can be taken.
+pub(super) struct Shelf<'a> {
+    belief: &'a Belief,
+    seen: Option<&'a VoxelSet>,
+    plan: FloorPlan,
+}
+
+impl<'a> Shelf<'a> {
+    pub(super) fn new(belief: &'a Belief, seen: Option<&'a VoxelSet>) -> Self {
+        Self { belief, seen, plan: FloorPlan::new(belief, AVOIDED) }
+    }
+
+    /// The objects that stand first behind the entrance somewhere, from left to right.
+    fn first_objects(&self) -> Vec<Patch> {
+        let [width, depth, _] = self.belief.grid.dims;
+        let mut objects: Vec<Patch> = Vec::new();
+        for x in 0..width {
+            let first = (x * depth..(x + 1) * depth).find(|cell| self.plan.stands(*cell));
+            let Some(first) = first.filter(|cell| !objects.iter().any(|object| object.contains(*cell))) else { continue };
+            objects.push(self.plan.patch(first, OBJECT_RADIUS_M));
+        }
+        objects
+    }
+
+    /// Where the front of an object is at a column and level: the row of its first solid voxel.
+    fn front(&self, target: &Patch, x: usize, level: usize) -> Option<usize> {
+        let grid = &self.belief.grid;
+        (0..grid.dims[1]).find(|y| {
+            let cell = x * grid.dims[1] + y;
+            target.contains(cell) && self.belief.probability(grid.column(cell).start + level) > AVOIDED
+        })
+    }
+
+    /// The place on an object's front where the cup fits that is nearest to its middle: where the cup touches, and the
+    /// tangent of the front's turn away from the entrance.
+    fn face(&self, room: &Room<'_>, target: &Patch, radius_m: f32) -> Option<(Voxel, Point, f32)> {
+        let (grid, extent) = (&self.belief.grid, room.extent(target));
+        let middle = 0.5 * (extent.x[0] + extent.x[1]) as f32;
+        let mut columns: Vec<usize> = (extent.x[0]..=extent.x[1]).collect();
+        columns.sort_by(|a, b| (*a as f32 - middle).abs().total_cmp(&(*b as f32 - middle).abs()));
+        let top_m = extent.levels as f32 * grid.voxel_m;
+        let fits = |z: &f32| *z - radius_m >= grid.voxel_m && *z + radius_m <= top_m - 0.5 * grid.voxel_m;
+        let heights = TRIED_M.map(|by| (0.5 * top_m + by).clamp(HEIGHTS_M[0], HEIGHTS_M[1]));
+        columns.iter().find_map(|&x| {
+            heights.into_iter().filter(fits).find_map(|z| self.is_face(target, x, z, radius_m))
+        })
+    }
+
+    fn is_face(&self, target: &Patch, x: usize, z_m: f32, radius_m: f32) -> Option<(Voxel, Point, f32)> {
+        let grid = &self.belief.grid;
+        let level = (z_m / grid.voxel_m) as usize;
+        let radius = radius_m / grid.voxel_m;
+        let reach = radius.ceil() as isize;
+        // Rows of the front over the cup's circle.
+        let mut rows: Vec<(f32, f32)> = Vec::new();
+        for i in -reach..=reach {
+            for k in -reach..=reach {
+                if (i as f32).hypot(k as f32) > radius {
+                    continue;
+                }
+                let (column, level) = (x.checked_add_signed(i)?, level.checked_add_signed(k)?);
+                if column >= grid.dims[0] || level >= grid.dims[2] {
+                    return None;
+                }
+                rows.push((i as f32, self.front(target, column, level)? as f32));
+            }
+        }
+        let count = rows.len() as f32;
+        let mean = rows.iter().map(|(_, row)| row).sum::<f32>() / count;
+        let slope = rows.iter().map(|(i, row)| i * (row - mean)).sum::<f32>() / rows.iter().map(|(i, _)| i * i).sum::<f32>();
+        let off = |(i, row): &(f32, f32)| row - mean - slope * i;
+        let (least, most) = rows.iter().map(off).fold((f32::MAX, f32::MIN), |(a, b), off| (a.min(off), b.max(off)));
+        let is_flat = (most - least) * grid.voxel_m <= STROKE_M + 0.5 * grid.voxel_m;
+        (is_flat && slope.abs() <= STEEPEST).then(|| {
+            let at = grid.cell_center(Cell { x: x as u16, y: 0 });
+            let y = grid.origin[1] + mean * grid.voxel_m;
+            let contact = Voxel { x: x as u16, y: mean.round() as u16, z: level as u16 };
+            (contact, Point::new(at.x, y, grid.origin[2] + z_m), slope)
+        })
+    }
+
+    /// What is asked of voxels, for `work`.
+    fn with_room<T>(&self, work: impl FnOnce(&Room<'_>) -> T) -> T {
+        let belief = self.belief;
+        let is_seen = |voxel: usize| self.seen.is_some_and(|seen| seen.contains(voxel));
+        let blocks = |voxel: usize| belief.probability(voxel) >= MAY_BLOCK;
+        let is_taken = |voxel: usize| belief.probability(voxel) > SEEN_FREE;
+        let is_unknown = |voxel: usize| {
+            let p = belief.probability(voxel);
+            (UNKNOWN[0]..=UNKNOWN[1]).contains(&p) && !is_seen(voxel)
+        };
+        work(&Room { grid: &belief.grid, blocks: &blocks, is_taken: &is_taken, is_unknown: &is_unknown })
+    }
+}
+
+/// Everything that can be taken, and what stands first but cannot, from left to right.
+pub(super) fn offers(shelf: &Shelf<'_>, radius_m: f32, place: PickPlace) -> Vec<Offer> {
+    shelf.with_room(|room| {
+        let offers = shelf.first_objects().into_iter().flat_map(|target| offers_of(shelf, room, target, radius_m, place));
+        offers.collect()
+    })
+}
+
+fn offers_of(shelf: &Shelf<'_>, room: &Room<'_>, target: Patch, radius_m: f32, place: PickPlace) -> Vec<Offer> {
+    let grid = &shelf.belief.grid;
+    let face = shelf.face(room, &target, radius_m);
+    let (contact, touch, slope) = face.unwrap_or_else(|| {
+        let Cell { x, y } = grid.cell(target.cells()[0]);
+        let level = (HEIGHTS_M[0] / grid.voxel_m) as u16;
+        let at = Voxel { x, y, z: level };
+        (at, grid.center(at), 0.0)
+    });
+    // A front that falls back to the right is met by a cup that is turned to the left.
+    let direction_deg = 90.0 + slope.atan().to_degrees();
+    let of = |place, against| Offer {
+        pick: Pick { contact: touch.coords.into(), direction_deg, place, end: None },
+        contact,
+        target: target.clone(),
+        against,
+    };
+    let against = match face {
+        None => Some(Rejection::NoFace),
+        Some(_) => room.way_out(&target).err(),
+    };
+    if against.is_some() {
+        return vec![of(None, against)];
+    }
+    match place {
+        PickPlace::Tray => vec![of(None, None)],
+        PickPlace::Shelf => match room.places(&target) {
+            places if places.is_empty() => vec![of(None, Some(Rejection::NoPlace))],
+            places => places.into_iter().map(|place| of(Some(place), None)).collect(),
+        },
+    }
+}

@@ -1,0 +1,129 @@
+//! A suction cup: when it seals on an object, and when what it holds comes off.
+//!
+//! A cup of 40 mm at 0.6 bar below the air's pressure presses an object on with `p A = 75 N`. What hangs on its front comes
+//! off when it is pulled sideways with more than friction holds (0.4, rubber on cardboard: [`PULL_N`]) or bent about the rim
+//! with more than `p A r` ([`BEND_NM`]).
+
+use super::{Physics, TIME_STEP_S, from_rapier, to_rapier, to_rapier_pose};
+use crate::arm::{Arm, Joints, pose_of};
+use crate::{Point, Vector};
+use rapier3d::dynamics::{FixedJointBuilder, ImpulseJointHandle};
+use rapier3d::math::Pose as RapierPose;
+use rapier3d::parry::query::Ray;
+
+/// How far the bellows gives way: the rim seals on what is at most so far behind it, uncompressed, metres.
+pub const STROKE_M: f32 = 0.008;
+/// How far before the rim a surface may be that the lip still meets, metres.
+const LIP_M: f32 = 0.002;
+/// Load at which what is held comes off, newtons.
+pub const PULL_N: f32 = 30.0;
+/// Moment about the cup's middle at which it comes off, newton metres.
+pub const BEND_NM: f32 = 1.5;
+/// Successive steps with more than that until it is off: what starts to move pulls harder for a moment.
+const LOADED_STEPS: u32 = 8;
+/// Points of the rim that have to meet the object.
+const RIM_POINTS: usize = 16;
+/// How far behind the rim rays begin, metres: deeper than any bellows.
+const BEHIND_M: f32 = 0.03;
+
+/// What the cup holds.
+#[derive(Clone)]
+pub(super) struct Held {
+    /// The object's number.
+    at: usize,
+    joint: ImpulseJointHandle,
+    loaded_steps: u32,
+}
+
+impl Physics {
+    /// The object that the cup of an arm at `joints` seals on: all of its rim meets that one, within the bellows' stroke.
+    pub(in crate::world) fn sealed_on(&self, arm: &Arm, joints: &Joints) -> Option<usize> {
+        let cup = arm.cup?;
+        let rim = pose_of(&arm.world_from_tool(joints));
+        let ahead = rim.rotation * Vector::z();
+        let mut sealed = None;
+        for number in 0..RIM_POINTS {
+            let (sin, cos) = (std::f32::consts::TAU * number as f32 / RIM_POINTS as f32).sin_cos();
+            let radius = cup.radius_m as f32;
+            let origin = rim * Point::new(radius * cos, radius * sin, -BEHIND_M);
+            let (at, distance) = self.first_object(origin, ahead, BEHIND_M + LIP_M)?;
+            let is_deep = distance < BEHIND_M - STROKE_M;
+            if is_deep || sealed.is_some_and(|sealed| sealed != at) {
+                return None;
+            }
+            sealed = Some(at);
+        }
+        sealed
+    }
+
+    /// The first object along a ray and how far it is, metres.
+    fn first_object(&self, origin: Point, ahead: Vector, reach_m: f32) -> Option<(usize, f32)> {
+        let ray = Ray::new(to_rapier(origin.coords), to_rapier(ahead));
+        let mut first: Option<(usize, f32)> = None;
+        for (at, handle) in self.handles.iter().enumerate() {
+            let Some(body) = self.world.bodies.get(*handle) else { continue };
+            for collider in body.colliders().iter().filter_map(|collider| self.world.colliders.get(*collider)) {
+                let reach = first.map_or(reach_m, |(_, distance)| distance);
+                if let Some(distance) = collider.shape().cast_ray(collider.position(), &ray, reach, true)
+                    && first.is_none_or(|(_, nearest)| distance < nearest)
+                {
+                    first = Some((at, distance));
+                }
+            }
+        }
+        first
+    }
+
+    /// Joins an object to the cup's body, as they are to each other now.
+    pub(in crate::world) fn hold(&mut self, at: usize) {
+        let Some(hand) = self.arm.last().map(|body| body.handle) else { return };
+        let object = self.handles[at];
+        let pose = |handle| self.world.bodies.get(handle).map(|body| from_rapier(body.position()));
+        let (Some(world_from_hand), Some(world_from_object)) = (pose(hand), pose(object)) else { return };
+        let hand_from_object = to_rapier_pose(&(world_from_hand.inverse() * world_from_object));
+        let joint = FixedJointBuilder::new()
+            .local_frame1(hand_from_object)
+            .local_frame2(RapierPose::IDENTITY)
+            .contacts_enabled(false);
+        let joint = self.world.insert_impulse_joint(hand, object, joint.build());
+        self.held = Some(Held { at, joint, loaded_steps: 0 });
+    }
+
+    /// The object in hand.
+    pub(in crate::world) fn held(&self) -> Option<usize> {
+        self.held.as_ref().map(|held| held.at)
+    }
+
+    /// Force and moment about the cup's middle between cup and what it holds in the last step, newtons and newton metres.
+    pub(in crate::world) fn load(&self, arm: &Arm, joints: &Joints) -> Option<(f32, f32)> {
+        let held = self.held.as_ref()?;
+        let joint = self.world.impulse_joints.get(held.joint)?;
+        let impulses = joint.impulses;
+        let per_s = |x: f32, y: f32, z: f32| Vector::new(x, y, z) / TIME_STEP_S;
+        let force = per_s(impulses[0], impulses[1], impulses[2]);
+        let moment = per_s(impulses[3], impulses[4], impulses[5]);
+        // The joint is at the object's origin and its axes; the moment about the cup has the force's too.
+        let object = from_rapier(self.world.bodies.get(self.handles[held.at])?.position());
+        let cup = arm.world_from_tool(joints).translation.vector.map(|v| v as f32);
+        let arm_m = object.inverse_transform_vector(&(object.translation.vector - cup));
+        Some((force.norm(), (moment + arm_m.cross(&force)).norm()))
+    }
+
+    /// Whether what is held comes off now, for it has been loaded with more than it bears for a while.
+    pub(in crate::world) fn comes_off(&mut self, arm: &Arm, joints: &Joints) -> bool {
+        let Some((force_n, moment_nm)) = self.load(arm, joints) else { return false };
+        let Some(held) = &mut self.held else { return false };
+        if std::env::var_os("DBG").is_some() { eprintln!("load {force_n:.1} {moment_nm:.2} tip {:?}", arm.world_from_tool(joints).translation.vector); }
+        let is_loaded = force_n > PULL_N || moment_nm > BEND_NM;
+        held.loaded_steps = if is_loaded { held.loaded_steps + 1 } else { 0 };
+        held.loaded_steps >= LOADED_STEPS
+    }
+
+    /// Switches suction off.
+    pub(in crate::world) fn let_go(&mut self) {
+        if let Some(held) = self.held.take() {
+            self.world.remove_impulse_joint(held.joint);
+            self.world.wake_up(self.handles[held.at], true);
+        }
+    }
+}

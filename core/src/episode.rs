@@ -32,7 +32,8 @@ pub use judgement::{Judgement, NO_TRUTH, Prior};
 pub use machine::Episode;
 pub use npz::{Precision, StoredTruth};
 pub use record::{
-    EpisodeConfig, EpisodeRecord, FORMAT, GripReport, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
+    EpisodeConfig, EpisodeRecord, FORMAT, GripReport, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord,
+    StepSeconds,
 };
 pub use replay::{Agreement, Difference, ReplayReport, TOLERANCE, replay};
 pub(crate) use resume::revisit;

@@ -11,7 +11,7 @@
 
 mod manipulated;
 
-use super::{predict_held_apart, Belief, BeliefUpdate, CLASSICAL, FloorPlan, Intervention, Prediction, SOLID};
+use super::{Belief, BeliefUpdate, CLASSICAL, FloorPlan, Intervention, Prediction, SOLID, predict_held_apart};
 use crate::camera::MapObservation;
 use crate::scene::CLASS_COUNT;
 use rayon::prelude::*;

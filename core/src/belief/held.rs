@@ -84,7 +84,7 @@ pub(crate) fn predict_held_apart(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::belief::{Classical, BeliefUpdate, Flow, FloorPlan, SOLID, Stroke};
+    use crate::belief::{BeliefUpdate, Classical, FloorPlan, Flow, SOLID, Stroke};
     use crate::grid::{Cell, Grid, VoxelSet};
     use crate::{Point, Vector};
 

@@ -14,7 +14,9 @@ use super::predict::predict;
 use super::push_net::PushNet;
 use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
-use crate::belief::{predict_held_apart, Belief, BeliefUpdate, Classical, Intervention, NetworksUsed, Prediction, Weights};
+use crate::belief::{
+    Belief, BeliefUpdate, Classical, Intervention, NetworksUsed, Prediction, Weights, predict_held_apart,
+};
 use crate::camera::MapObservation;
 use crate::files::sha256_of_file;
 use crate::grid::Grid;

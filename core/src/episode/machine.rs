@@ -86,7 +86,10 @@ impl Episode {
         let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         if policy.picks() && arm.arm.cup.is_none() {
-            let message = format!("policy {policy} takes objects by suction, and the hand of {} has no cup; choose --arm suction", arm.arm.name);
+            let message = format!(
+                "policy {policy} takes objects by suction, and the hand of {} has no cup; choose --arm suction",
+                arm.arm.name
+            );
             return Err(Error::Usage(message));
         }
         let hands = Arc::new(views.hand_poses(&arm));
@@ -321,10 +324,7 @@ impl Episode {
             contacts: outcome.link_contacts.iter().map(touch).collect(),
             against_wall: outcome.against_wall.iter().map(|id| self.name(*id)).collect(),
             arm_in_shelf_m: outcome.arm_in_shelf_m,
-            grip: outcome.grip.map(|grip| GripReport {
-                object: grip.object.map(|id| self.name(id)),
-                end: grip.end,
-            }),
+            grip: outcome.grip.map(|grip| GripReport { object: grip.object.map(|id| self.name(id)), end: grip.end }),
         }
     }
 

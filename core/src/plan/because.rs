@@ -61,7 +61,9 @@ impl Decision {
         let Rule { policy, settings } = self.ruled_by();
         let pushes = matches!(self.action, Action::Manipulate(_));
         match policy {
-            PolicyKind::Mem | PolicyKind::MemPick | PolicyKind::ClairvoyantPush => "the policy's schedule says so".to_owned(),
+            PolicyKind::Mem | PolicyKind::MemPick | PolicyKind::ClairvoyantPush => {
+                "the policy's schedule says so".to_owned()
+            }
             PolicyKind::MemNoPush => "it is the best view, and the policy never pushes".to_owned(),
             PolicyKind::Random | PolicyKind::RandomCnabu => "the policy draws its views at random".to_owned(),
             PolicyKind::RandomPush5 | PolicyKind::RandomPush5Blind | PolicyKind::RandomViewPush5 if pushes => {

@@ -1,7 +1,7 @@
 //! The policies by name, and what each of them does.
 
-use crate::belief::{CLASSICAL, CNABU};
 use super::PlannerSettings;
+use crate::belief::{CLASSICAL, CNABU};
 use crate::named;
 use crate::skill::{SkillKind, SkillSet};
 use crate::{Error, Result};

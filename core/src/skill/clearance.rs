@@ -209,7 +209,12 @@ impl<'a> ArmClearance<'a> {
     }
 
     /// What the gripper meets that it may not touch when it is moved along `travel`, and the share of the way until there.
-    pub(super) fn gripper_hit(&self, from: &Frame, travel: &Vector3<f64>, touches: Option<&Patch>) -> (f64, Option<Hit>) {
+    pub(super) fn gripper_hit(
+        &self,
+        from: &Frame,
+        travel: &Vector3<f64>,
+        touches: Option<&Patch>,
+    ) -> (f64, Option<Hit>) {
         let height = self.grid.dims[2];
         let may_touch = |index: usize| touches.is_some_and(|patch| patch.contains(index / height));
         let blocks = |index: usize| self.confident.contains(index) && !may_touch(index);

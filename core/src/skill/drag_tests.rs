@@ -1,9 +1,9 @@
 use super::*;
-use crate::skill::PickPlace;
 use crate::arm::ArmTool;
 use crate::belief::{BeliefUpdate, Classical, evidence};
 use crate::rng::stream;
 use crate::scene::{Body, ClassId, ObjectId, Shelf};
+use crate::skill::PickPlace;
 use crate::skill::{PushSampler, SkillKind};
 use crate::solid::Solid;
 use crate::world::World;

@@ -152,7 +152,7 @@ impl Skill for Pick {
 
     fn is_done_by(&self, motion: &PhasedMotion, arm: &Arm, ready: &Joints) -> bool {
         let from = self.touch() + self.ahead() * carry::PRESS_M;
-        let to = self.place.map(|[x, y]| from + Vector::new(x, y, -carry::GAP_M));
+        let to = self.place.map(|[x, y]| from + Vector::new(x, y, carry::GAP_M));
         motion.leads_in(PhaseKind::Carry, arm, ready, from, to)
     }
 
@@ -208,7 +208,14 @@ impl Skill for Pick {
             parameter("start_x_m", "from x", None, x, Unit::Metres, touched),
             parameter("start_y_m", "from y", None, y, Unit::Metres, touched),
             parameter("start_z_m", "from z", None, z, Unit::Metres, touched),
-            parameter("direction_deg", "towards", Some("To"), self.direction_deg, Unit::Degrees, "Where the cup points"),
+            parameter(
+                "direction_deg",
+                "towards",
+                Some("To"),
+                self.direction_deg,
+                Unit::Degrees,
+                "Where the cup points",
+            ),
         ];
         if let Some([dx, dy]) = self.place {
             let hint = "How far from where it stood the object is set down";
@@ -241,7 +248,9 @@ impl Skill for Pick {
             lines.push(vec![out, before, to]);
             let half = 0.5 * PLACE_MARK_M;
             let corner = |x: f32, y: f32| Point::new(to.x + x * half, to.y + (y + 1.0) * half, 0.002);
-            lines.push([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(x, y)| corner(x, y)).into());
+            lines.push(
+                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)].map(|(x, y)| corner(x, y)).into(),
+            );
         }
         Outline { arrows: vec![Arrow { start: stroke.start, way: stroke.direction * stroke.length_m }], lines }
     }

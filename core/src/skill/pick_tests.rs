@@ -104,7 +104,8 @@ fn a_box_a_can_and_a_turned_box_are_taken_out_and_set_down_where_they_were_to_be
             let grip = outcome.grip.expect("suction");
             assert_eq!(grip, Grip { object: Some(ObjectId(0)), end: GripEnd::SetDown }, "{size:?} {yaw}");
             let [dx, dy] = pick.place.expect("in the shelf");
-            let moved = after.bodies()[0].world_from_body.translation.vector - bodies[0].world_from_body.translation.vector;
+            let moved =
+                after.bodies()[0].world_from_body.translation.vector - bodies[0].world_from_body.translation.vector;
             let off = (moved - Vector::new(dx, dy, 0.0)).norm();
             assert!(off < 0.012, "{size:?} {yaw}: it stands {off} m from where it was to be: {moved:?} for {dx} {dy}");
             assert!(after.deepest_overlap_m() < 0.003);
@@ -117,7 +118,8 @@ fn a_box_a_can_and_a_turned_box_are_taken_out_and_set_down_where_they_were_to_be
 #[test]
 fn with_a_tray_the_object_is_gone_for_good_and_no_drop() {
     let arm = arm();
-    let world = settled(vec![body(0, [0.06, 0.05, 0.12], 0.0, 0.2, 0.0, 0.4), body(1, [0.06, 0.05, 0.10], 0.2, 0.2, 0.0, 0.4)]);
+    let world =
+        settled(vec![body(0, [0.06, 0.05, 0.12], 0.0, 0.2, 0.0, 0.4), body(1, [0.06, 0.05, 0.10], 0.2, 0.2, 0.0, 0.4)]);
     let belief = knowing(&world.bodies());
     let (pick, motion) = pick_at(&picks(&belief, &arm, PickPlace::Tray), 0.0);
     assert_eq!(pick.place, None);
@@ -167,8 +169,13 @@ fn a_hand_without_a_cup_offers_no_picks_and_says_why() {
 #[test]
 fn a_place_on_something_is_refused_and_one_that_is_free_is_taken() {
     let arm = arm();
-    let belief =
-        knowing(&settled(vec![body(0, [0.06, 0.05, 0.12], 0.0, 0.15, 0.0, 0.4), body(1, [0.06, 0.05, 0.12], 0.2, 0.15, 0.0, 0.4)]).bodies());
+    let belief = knowing(
+        &settled(vec![
+            body(0, [0.06, 0.05, 0.12], 0.0, 0.15, 0.0, 0.4),
+            body(1, [0.06, 0.05, 0.12], 0.2, 0.15, 0.0, 0.4),
+        ])
+        .bodies(),
+    );
     let (pick, _) = pick_at(&picks(&belief, &arm, PickPlace::Shelf), 0.0);
     let clearance = ArmClearance::new(&arm, &belief);
     let plan = |place| Pick { place: Some(place), ..pick }.plan(&clearance, &mut stream(0, "test", 0));
@@ -192,6 +199,10 @@ fn nothing_that_is_not_there_or_too_heavy_is_held() {
         world.execute(&arm.arm, &motion).grip.map(|grip| grip.end)
     };
     assert_eq!(of(vec![body(0, [0.06, 0.05, 0.12], 0.3, 0.15, 0.0, 0.4)]), Some(GripEnd::NoSeal), "it is elsewhere");
-    assert_eq!(of(vec![body(0, [0.03, 0.05, 0.12], 0.0, 0.15, 0.0, 0.4)]), Some(GripEnd::NoSeal), "its front is an edge");
+    assert_eq!(
+        of(vec![body(0, [0.03, 0.05, 0.12], 0.0, 0.15, 0.0, 0.4)]),
+        Some(GripEnd::NoSeal),
+        "its front is an edge"
+    );
     assert_eq!(of(vec![body(0, [0.06, 0.05, 0.12], 0.0, 0.15, 0.0, 4.0)]), Some(GripEnd::CameOff), "4 kg are too much");
 }

@@ -212,7 +212,10 @@ mod tests {
     #[test]
     fn a_skill_that_this_program_lacks_is_named_with_those_it_has() {
         let error = serde_json::from_value::<Manipulation>(json!({ "kind": "fly", "start": [0, 0, 0] }));
-        assert_eq!(error.expect_err("no skill").to_string(), "this program has no skill `fly`; it has push, drag, pick");
+        assert_eq!(
+            error.expect_err("no skill").to_string(),
+            "this program has no skill `fly`; it has push, drag, pick"
+        );
         let error = serde_json::from_value::<Manipulation>(json!({ "kind": "push", "start": [0, 0, 0] }));
         assert!(error.expect_err("incomplete").to_string().starts_with("push: missing field"));
     }

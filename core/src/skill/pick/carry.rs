@@ -2,8 +2,8 @@
 
 use super::{OUT, Pick};
 use crate::arm::{
-    CARRY_M_S, Follow, Frame, Joints, Motion, Phase, PhaseKind, PhasedMotion, Space, WAY_BACK_M_S, follow_line, level_tool,
-    plan,
+    CARRY_M_S, Follow, Frame, Joints, Motion, Phase, PhaseKind, PhasedMotion, Space, WAY_BACK_M_S, follow_line,
+    level_tool, plan,
 };
 use crate::belief::Patch;
 use crate::rng::ChaCha8Rng;
@@ -73,7 +73,7 @@ pub(super) fn motion(
             let [dx, dy] = [dx, dy].map(f64::from);
             carrying.go(Vector3::new(dx, 0.0, 0.0))?;
             carrying.go(Vector3::new(0.0, out + dy, 0.0))?;
-            carrying.go(Vector3::new(0.0, 0.0, -(up + f64::from(GAP_M))))?;
+            carrying.go(Vector3::new(0.0, 0.0, -(up - f64::from(GAP_M))))?;
             phases.push(Phase::closed(PhaseKind::Carry, Motion::along(arm, &carrying.path, CARRY_M_S)));
             phases.push(Phase::closed(PhaseKind::Retreat, carrying.back(&ready, out + dy, rng)?));
         }
@@ -110,7 +110,9 @@ impl Carrying<'_> {
             met.is_none()
         });
         if !complete {
-            return Err(met.map_or(Rejection::Unreachable { stage: OUT }, |hit| Rejection::ArmBlocked { stage: OUT, hit }));
+            return Err(
+                met.map_or(Rejection::Unreachable { stage: OUT }, |hit| Rejection::ArmBlocked { stage: OUT, hit })
+            );
         }
         self.path.extend(path.into_iter().skip(1));
         Ok(())

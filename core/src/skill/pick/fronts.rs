@@ -51,7 +51,9 @@ impl<'a> Shelf<'a> {
         let mut objects: Vec<Patch> = Vec::new();
         for x in 0..width {
             let first = (x * depth..(x + 1) * depth).find(|cell| self.plan.stands(*cell));
-            let Some(first) = first.filter(|cell| !objects.iter().any(|object| object.contains(*cell))) else { continue };
+            let Some(first) = first.filter(|cell| !objects.iter().any(|object| object.contains(*cell))) else {
+                continue;
+            };
             objects.push(self.plan.patch(first, OBJECT_RADIUS_M));
         }
         objects
@@ -76,9 +78,9 @@ impl<'a> Shelf<'a> {
         let top_m = extent.levels as f32 * grid.voxel_m;
         let fits = |z: &f32| *z - radius_m >= grid.voxel_m && *z + radius_m <= top_m - 0.5 * grid.voxel_m;
         let heights = TRIED_M.map(|by| (0.5 * top_m + by).clamp(HEIGHTS_M[0], HEIGHTS_M[1]));
-        columns.iter().find_map(|&x| {
-            heights.into_iter().filter(fits).find_map(|z| self.is_face(target, x, z, radius_m))
-        })
+        columns
+            .iter()
+            .find_map(|&x| heights.into_iter().filter(fits).find_map(|z| self.is_face(target, x, z, radius_m)))
     }
 
     fn is_face(&self, target: &Patch, x: usize, z_m: f32, radius_m: f32) -> Option<(Voxel, Point, f32)> {
@@ -102,7 +104,8 @@ impl<'a> Shelf<'a> {
         }
         let count = rows.len() as f32;
         let mean = rows.iter().map(|(_, row)| row).sum::<f32>() / count;
-        let slope = rows.iter().map(|(i, row)| i * (row - mean)).sum::<f32>() / rows.iter().map(|(i, _)| i * i).sum::<f32>();
+        let slope =
+            rows.iter().map(|(i, row)| i * (row - mean)).sum::<f32>() / rows.iter().map(|(i, _)| i * i).sum::<f32>();
         let off = |(i, row): &(f32, f32)| row - mean - slope * i;
         let (least, most) = rows.iter().map(off).fold((f32::MAX, f32::MIN), |(a, b), off| (a.min(off), b.max(off)));
         let is_flat = (most - least) * grid.voxel_m <= STROKE_M + 0.5 * grid.voxel_m;
@@ -131,7 +134,8 @@ impl<'a> Shelf<'a> {
 /// Everything that can be taken, and what stands first but cannot, from left to right.
 pub(super) fn offers(shelf: &Shelf<'_>, radius_m: f32, place: PickPlace) -> Vec<Offer> {
     shelf.with_room(|room| {
-        let offers = shelf.first_objects().into_iter().flat_map(|target| offers_of(shelf, room, target, radius_m, place));
+        let offers =
+            shelf.first_objects().into_iter().flat_map(|target| offers_of(shelf, room, target, radius_m, place));
         offers.collect()
     })
 }

@@ -159,7 +159,8 @@ impl Places {
 
     /// How many unknown voxels it hides there; `None` where it cannot be set down.
     fn hides(&self, [dx, dy]: [isize; 2]) -> Option<u32> {
-        let moved = |[low, high]: [usize; 2], by: isize| Some([low.checked_add_signed(by)?, high.checked_add_signed(by)?]);
+        let moved =
+            |[low, high]: [usize; 2], by: isize| Some([low.checked_add_signed(by)?, high.checked_add_signed(by)?]);
         let (x, y) = (moved(self.extent.x, dx)?, moved(self.extent.y, dy)?);
         let m = self.margin;
         let inside = x[0] >= m && y[0] >= m && x[1] + m < self.dims[0] && y[1] + m < self.dims[1];

@@ -99,7 +99,9 @@ impl Physics {
         let held = self.held.as_ref()?;
         let joint = self.world.impulse_joints.get(held.joint)?;
         let impulses = joint.impulses;
-        let per_s = |x: f32, y: f32, z: f32| Vector::new(x, y, z) / TIME_STEP_S;
+        // The solver leaves the impulses of the last of its substeps.
+        let substep_s = TIME_STEP_S / self.world.integration_parameters.num_solver_iterations as f32;
+        let per_s = |x: f32, y: f32, z: f32| Vector::new(x, y, z) / substep_s;
         let force = per_s(impulses[0], impulses[1], impulses[2]);
         let moment = per_s(impulses[3], impulses[4], impulses[5]);
         // The joint is at the object's origin and its axes; the moment about the cup has the force's too.
@@ -113,7 +115,6 @@ impl Physics {
     pub(in crate::world) fn comes_off(&mut self, arm: &Arm, joints: &Joints) -> bool {
         let Some((force_n, moment_nm)) = self.load(arm, joints) else { return false };
         let Some(held) = &mut self.held else { return false };
-        if std::env::var_os("DBG").is_some() { eprintln!("load {force_n:.1} {moment_nm:.2} tip {:?}", arm.world_from_tool(joints).translation.vector); }
         let is_loaded = force_n > PULL_N || moment_nm > BEND_NM;
         held.loaded_steps = if is_loaded { held.loaded_steps + 1 } else { 0 };
         held.loaded_steps >= LOADED_STEPS
@@ -125,5 +126,72 @@ impl Physics {
             self.world.remove_impulse_joint(held.joint);
             self.world.wake_up(self.handles[held.at], true);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::ArmTool;
+    use crate::scene::{Body, ClassId, ObjectId, RobotFile, RobotPlacement, Shelf};
+    use crate::solid::Solid;
+    use crate::{Pose, arm};
+    use std::sync::Arc;
+
+    /// The arm where it waits, and a box of 0.4 kg before its cup, `ahead_m` from the rim.
+    fn hanging(ahead_m: f32, aside_m: f32) -> (ArmTool, Joints, Physics) {
+        let shelf = Shelf::new([0.80, 0.40, 0.40]);
+        let placement = RobotPlacement { urdf: Some(RobotFile::suction()), ..RobotPlacement::default() };
+        let tool = ArmTool::new(Arm::placed(&placement).expect("shipped"), shelf);
+        let ready = tool.ready.expect("within reach");
+        let rim = arm::pose_of(&tool.arm.world_from_tool(&ready));
+        let place = rim.translation.vector + Vector::new(aside_m, 0.03 + ahead_m, -0.05);
+        let body = Body {
+            id: ObjectId(0),
+            class: ClassId(1),
+            solid: Arc::new(Solid::standing_box(Vector::new(0.06, 0.06, 0.10))),
+            world_from_body: Pose::translation(place.x, place.y, place.z),
+            mass_kg: 0.4,
+            friction: 0.5,
+        };
+        let mut physics = Physics::new(&shelf, &[body]);
+        physics.begin();
+        physics.insert_arm(&tool.arm, &ready);
+        (tool, ready, physics)
+    }
+
+    #[test]
+    fn the_cup_seals_within_the_bellows_stroke_and_on_all_of_its_rim() {
+        let sealed = |ahead_m, aside_m| {
+            let (tool, ready, physics) = hanging(ahead_m, aside_m);
+            physics.sealed_on(&tool.arm, &ready)
+        };
+        for ahead_m in [-0.007, -0.004, 0.001] {
+            assert_eq!(sealed(ahead_m, 0.0), Some(0), "{ahead_m}");
+        }
+        assert_eq!(sealed(-0.010, 0.0), None, "the bellows gives way no farther");
+        assert_eq!(sealed(0.004, 0.0), None, "nothing meets the lip");
+        assert_eq!((sealed(-0.004, 0.009), sealed(-0.004, 0.012)), (Some(0), None), "over an edge");
+    }
+
+    #[test]
+    fn what_hangs_on_the_cup_loads_it_with_its_weight_and_stays_where_it_is() {
+        let (tool, ready, mut physics) = hanging(-0.004, 0.0);
+        let at = physics.sealed_on(&tool.arm, &ready).expect("sealed");
+        physics.hold(at);
+        let before = physics.pose(at);
+        for _ in 0..120 {
+            physics.step_arm(&tool.arm, &ready);
+            assert!(!physics.comes_off(&tool.arm, &ready));
+        }
+        let (force_n, moment_nm) = physics.load(&tool.arm, &ready).expect("held");
+        assert!((force_n - 0.4 * 9.81).abs() < 0.1, "{force_n} N");
+        // Its middle hangs 26 mm before the cup.
+        assert!((moment_nm - 0.4 * 9.81 * 0.026).abs() < 0.02, "{moment_nm} Nm");
+        assert!((physics.pose(at).translation.vector - before.translation.vector).norm() < 0.001);
+        physics.let_go();
+        assert_eq!((physics.held(), physics.load(&tool.arm, &ready)), (None, None));
+        (0..24).for_each(|_| physics.step());
+        assert!(physics.pose(at).translation.z < before.translation.z - 0.02, "it falls");
     }
 }

@@ -11,7 +11,6 @@ use nudge_core::gain::RayDensity;
 use nudge_core::plan::{Action, Decision, Gain, PlannerSettings, PolicyKind, Reason};
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
 use nudge_core::skill::intended;
-use nudge_core::skill::intended;
 use nudge_core::world::TruthMap;
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};

@@ -113,8 +113,8 @@ end
 begin 'a skill' drag core/src/skill/scratch.rs
 awk '/^#\[cfg\(test\)\]/ { exit } { print }' core/src/skill/drag.rs | sed 's/\bDrag\b/Scratch/g' >core/src/skill/scratch.rs
 after core/src/skill.rs 'mod drag;' 'mod scratch;'
-after core/src/skill/registry.rs 'use super::drag::Drag;' 'use super::scratch::Scratch;'
-after core/src/skill/registry.rs '    Drag(Drag):' '    Scratch(Scratch): "scratch", "scratches", "scratches";'
+after core/src/skill.rs 'use drag::Drag;' 'use scratch::Scratch;'
+after core/src/skill.rs '    Drag(Drag):' '    Scratch(Scratch): "scratch", "scratches", "scratches";'
 end
 
 begin 'an environment' simulated core/src/environment/scratch.rs

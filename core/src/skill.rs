@@ -5,7 +5,11 @@
 //! [`Manipulation`] alone: the planner weighs them, the world and the robot carry out their [`PhasedMotion`]s, belief updates
 //! see [`Intervention`]s, and whoever shows them prints what [`Skill::describe`] and [`Skill::outline`] say.
 //!
-//! A new skill is a module below this one and one line in the list in `skill/registry.rs`.
+//! A new skill is a module below this one and one line in the list below.
+
+// First, so that its macro is there.
+#[macro_use]
+mod registry;
 
 mod carried;
 mod clearance;
@@ -14,7 +18,6 @@ mod drag;
 mod manipulation;
 pub mod pick;
 pub mod push;
-mod registry;
 mod rejection;
 mod sampling;
 mod shown;
@@ -24,7 +27,7 @@ pub use counterfactual::{Counterfactual, PushTruth, REACH_DENSITY};
 pub use manipulation::{SweptManipulation, intended, random_candidate};
 pub use pick::{Pick, PickPlace};
 pub use push::{Push, PushSampler};
-pub use registry::{Manipulation, SkillKind, SkillSet};
+pub use registry::SkillSet;
 pub use rejection::{Rejection, Stage};
 pub use shown::{Arrow, Description, Fact, Outline, Parameter, Unit};
 
@@ -33,6 +36,14 @@ use crate::belief::{Belief, FloorPlan, Intervention};
 use crate::grid::{Voxel, VoxelSet};
 use crate::rng::ChaCha8Rng;
 use crate::world::ManipulationOutcome;
+use drag::Drag;
+use serde::Serialize;
+
+skills! {
+    Push(Push): "push", "pushes", "pushes";
+    Drag(Drag): "drag", "drags", "drags";
+    Pick(Pick): "pick", "picks", "picks";
+}
 
 /// Occupancy probability from which a voxel counts as surely occupied (high confidence).
 pub const CONFIDENT: f32 = 0.85;

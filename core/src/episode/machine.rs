@@ -2,9 +2,7 @@
 
 use super::estimate::{Estimate, Told, sense};
 use super::judgement::{Judgement, Prior, entropy_nats};
-use super::record::{
-    EpisodeConfig, EpisodeRecord, FORMAT, GripReport, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
-};
+use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, PushReport, StepOutcome, StepRecord, StepSeconds};
 use super::stopwatch::Stopwatch;
 use crate::arm::{Arm, ArmTool, HandPose, Motion, PhasedMotion};
 use crate::belief::{Belief, BeliefUpdate};
@@ -267,7 +265,7 @@ impl Episode {
             dropped: outcome.dropped.clone(),
             displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
             motion_s: to_wait.duration_s() + f64::from(outcome.arm_s),
-            push: Some(self.report(&outcome)),
+            push: Some(PushReport::of(&outcome, |id| self.name(id))),
         };
         let record = self.file(decision, happened, started, seconds);
         Ok(StepOutcome {
@@ -311,21 +309,6 @@ impl Episode {
         let motion = self.arm.carry(from, &to, &mut rng);
         self.hand = Some(to);
         Some(motion)
-    }
-
-    fn report(&self, outcome: &ManipulationOutcome) -> PushReport {
-        let touch = |contact: &crate::world::LinkContact| LinkTouch {
-            link: contact.link.clone(),
-            object: self.name(contact.object),
-        };
-        PushReport {
-            pushed_m: outcome.way_m,
-            stalled: outcome.stalled,
-            contacts: outcome.link_contacts.iter().map(touch).collect(),
-            against_wall: outcome.against_wall.iter().map(|id| self.name(*id)).collect(),
-            arm_in_shelf_m: outcome.arm_in_shelf_m,
-            grip: outcome.grip.map(|grip| GripReport { object: grip.object.map(|id| self.name(id)), end: grip.end }),
-        }
     }
 
     /// `class#id`.

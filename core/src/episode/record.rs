@@ -6,10 +6,10 @@ use crate::belief::{BeliefUpdate, Prediction};
 use crate::camera::{Frame, MapObservation, NoiseModel};
 use crate::made_by::MadeBy;
 use crate::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, Rule};
-use crate::scene::Scene;
+use crate::scene::{ObjectId, Scene};
 use crate::score::{ObjectVerdict, Scores};
 use crate::skill::SweptManipulation;
-use crate::world::{GripEnd, ManipulationOutcome};
+use crate::world::{GripEnd, LinkContact, ManipulationOutcome};
 use serde::{Deserialize, Serialize};
 
 /// The format number of `episode.json`. In format 1, which is still read, every episode had a truth, and `entropy_nats`
@@ -171,6 +171,21 @@ pub struct GripReport {
     pub object: Option<String>,
     /// How it ended.
     pub end: GripEnd,
+}
+
+impl PushReport {
+    /// Of an outcome; `name` gives an object as `class#id`.
+    pub(super) fn of(outcome: &ManipulationOutcome, name: impl Fn(ObjectId) -> String) -> Self {
+        let touch = |contact: &LinkContact| LinkTouch { link: contact.link.clone(), object: name(contact.object) };
+        Self {
+            pushed_m: outcome.way_m,
+            stalled: outcome.stalled,
+            contacts: outcome.link_contacts.iter().map(touch).collect(),
+            against_wall: outcome.against_wall.iter().map(|id| name(*id)).collect(),
+            arm_in_shelf_m: outcome.arm_in_shelf_m,
+            grip: outcome.grip.map(|grip| GripReport { object: grip.object.map(&name), end: grip.end }),
+        }
+    }
 }
 
 /// A link that touched an object.

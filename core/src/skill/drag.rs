@@ -8,8 +8,8 @@ use super::clearance::{Approach, gripper_poses};
 use super::push::{LENGTH_M, STANDOFF_M};
 use super::sampling::draw_until;
 use super::{
-    AVOIDED, ArmClearance, Arrow, Candidate, DRAWS_PER_CANDIDATE, Description, Fact, Ground, Manipulation, Outline,
-    Parameter, Rejection, Skill, SkillKind, Stage, Unit,
+    AVOIDED, ArmClearance, Arrow, Candidate, DRAWS_PER_CANDIDATE, Description, Fact, Ground, LIKELY, Manipulation,
+    Outline, Parameter, Rejection, Skill, SkillKind, Stage, Unit,
 };
 use crate::arm::{Arm, ArmTool, Joints, PhasedMotion, inclined_tool};
 use crate::belief::{Belief, FloorPlan, Flow, Intervention, Met, OBJECT_RADIUS_M, Patch, SOLID, Stroke};
@@ -30,8 +30,6 @@ const BELOW_TOP_M: [f32; 2] = [0.015, 0.06];
 const FINGER_HALF_M: f32 = 0.0175;
 /// How far above the object the finger is at the start, metres.
 const GAP_M: f32 = 0.01;
-/// Occupancy probability up to which the space behind an object counts as free.
-const FREE: f32 = 0.4;
 /// How far behind the contact there must be free space, and how far to either side of it: the finger, metres.
 const ROOM_M: [f32; 2] = [0.045, 0.015];
 /// How far beyond its way the object may begin that the finger, reaching over it, pulls, metres.
@@ -123,7 +121,7 @@ impl Backs<'_> {
         levels.max().map_or(0.0, |level| (level + 1) as f32 * grid.voxel_m)
     }
 
-    /// Whether the space behind a floor cell is believed free, so far back, and from some height up to another.
+    /// Whether nothing likely stands behind a floor cell (what is right behind an object no view shows), so far back, and from some height up to another.
     fn has_room(&self, cell: usize, back_m: f32, [low_m, high_m]: [f32; 2]) -> bool {
         let grid = &self.belief.grid;
         let [width, depth, height] = grid.dims;
@@ -134,7 +132,7 @@ impl Backs<'_> {
         }
         let free = |x: usize, y: usize| {
             let first = grid.column(x * depth + y).start;
-            (level(low_m)..=level(high_m)).all(|z| self.belief.probability(first + z) <= FREE)
+            (level(low_m)..=level(high_m)).all(|z| self.belief.probability(first + z) < LIKELY)
         };
         (x - beside..=x + beside).all(|x| (y + 1..=y + back).all(|y| free(x, y)))
     }
@@ -142,8 +140,11 @@ impl Backs<'_> {
     /// The floor cells at the back of what stands, behind which the belief has room.
     fn all(&self) -> Vec<usize> {
         let cells = 0..self.belief.grid.cell_count();
-        let low = [LOWEST_M, LOWEST_M + 2.0 * FINGER_HALF_M];
-        cells.filter(|cell| self.plan.stands(*cell) && self.has_room(*cell, ROOM_M[0], low)).collect()
+        let has_room = |cell: &usize| {
+            let tip_m = (self.top_m(*cell) - BELOW_TOP_M[0]).max(LOWEST_M);
+            self.has_room(*cell, ROOM_M[0], [tip_m - FINGER_HALF_M, tip_m + FINGER_HALF_M])
+        };
+        cells.filter(|cell| self.plan.stands(*cell) && has_room(cell)).collect()
     }
 
     /// A drag of what stands on a floor cell: of some inclinations and heights the first one that has room, else the last.

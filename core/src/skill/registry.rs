@@ -1,10 +1,7 @@
-//! The list of skills.
+//! What is made of the list of skills in the module above: one type for a manipulation of any skill, the skills by name, and
+//! sets of them.
 
-use super::drag::Drag;
-use super::pick::Pick;
-use super::push::Push;
-use super::{Candidate, Ground, Skill};
-use crate::rng::ChaCha8Rng;
+use super::{Manipulation, SkillKind};
 use serde::{Deserialize, Serialize};
 
 /// Makes [`Manipulation`] and [`SkillKind`] of the list of skills: a variant, the type that implements [`Skill`], its name in
@@ -46,7 +43,7 @@ macro_rules! skills {
             }
 
             /// A manipulation of a skill from what a file has of it.
-            pub(super) fn read(kind: SkillKind, value: serde_json::Value) -> serde_json::Result<Self> {
+            fn read(kind: SkillKind, value: serde_json::Value) -> serde_json::Result<Self> {
                 Ok(match kind {
                     $(SkillKind::$kind => Self::$kind(serde_json::from_value(value)?),)*
                 })
@@ -89,12 +86,6 @@ macro_rules! skills {
             }
         }
     };
-}
-
-skills! {
-    Push(Push): "push", "pushes", "pushes";
-    Drag(Drag): "drag", "drags", "drags";
-    Pick(Pick): "pick", "picks", "picks";
 }
 
 impl SkillKind {

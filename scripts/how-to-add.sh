@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Adds a policy, a setting, a panel, a layout and a belief update to a copy of the sources, each in exactly the files that
+# Adds a policy, a setting, a belief update, a skill, an environment, a panel and a layout to a copy of the sources, each in exactly the files that
 # "Where to add" in ARCHITECTURE.md lists, counts those files, and compiles the copy. The sources stay as they are.
 #
 #   scripts/how-to-add.sh            counts and compiles (some minutes)
@@ -97,7 +97,7 @@ awk '/^pub trait BeliefUpdate/ { inside = 1 }
     done <scratch.methods
     echo '}'
 } >>core/src/belief/scratch.rs
-types=$(grep -oE '\b(MapObservation|SweptPush|PushPrediction|Intervention|ManipulationPrediction)\b' scratch.methods | sort -u)
+types=$(grep -oE '\b(MapObservation|Intervention|Prediction)\b' scratch.methods | sort -u)
 for type in $types; do
     path=$(grep -qE "^use crate::camera::.*\b$type\b" core/src/belief.rs && echo crate::camera || echo super)
     after core/src/belief/scratch.rs 'use super::{Belief' "use $path::$type;"
@@ -108,6 +108,48 @@ after core/src/belief.rs 'pub const CLASSICAL' $'/// Scratch.\npub const SCRATCH
 change app/src/driver.rs 'BELIEFS: [&str; 2] = [CLASSICAL' 'BELIEFS: [&str; 3] = [nudge_core::belief::SCRATCH, CLASSICAL'
 after app/src/driver.rs '    match name {' \
     '        nudge_core::belief::SCRATCH => Ok(Ok(Arc::new(nudge_core::belief::Scratch))),'
+end
+
+begin 'a skill' drag core/src/skill/scratch.rs
+awk '/^#\[cfg\(test\)\]/ { exit } { print }' core/src/skill/drag.rs | sed 's/\bDrag\b/Scratch/g' >core/src/skill/scratch.rs
+after core/src/skill.rs 'mod drag;' 'mod scratch;'
+after core/src/skill.rs 'use drag::Drag;' 'use scratch::Scratch;'
+after core/src/skill.rs '    Drag(Drag):' '    Scratch(Scratch): "scratch", "scratches", "scratches";'
+end
+
+begin 'an environment' simulated core/src/environment/scratch.rs
+cat >core/src/environment/scratch.rs <<'RUST'
+//! Scratch.
+
+use super::Environment;
+use crate::arm::{Arm, PhasedMotion};
+use crate::camera::{Intrinsics, Sensed, View};
+use crate::world::{ManipulationOutcome, TruthMap};
+use crate::{Error, Result};
+
+/// Scratch.
+pub struct Scratch;
+
+impl Environment for Scratch {
+    fn frame(&mut self, _: &View, _: &Intrinsics) -> Result<Sensed> {
+        Err(Error::Usage(String::new()))
+    }
+
+    fn carry_out(&mut self, _: &Arm, _: &PhasedMotion) -> Result<ManipulationOutcome> {
+        Err(Error::Usage(String::new()))
+    }
+
+    fn truth(&self) -> Option<&TruthMap> {
+        None
+    }
+
+    fn branch(&self) -> Option<Box<dyn Environment>> {
+        None
+    }
+}
+RUST
+after core/src/environment.rs 'mod simulated;' 'mod scratch;'
+after core/src/environment.rs 'pub use simulated::' 'pub use scratch::Scratch;'
 end
 
 panels=app/src/workbench/panels

@@ -1,14 +1,15 @@
 //! A scripted episode for tests: real images, real pushes and the classical belief, with made-up gains.
 
 use nudge_core::arm::ArmTool;
-use nudge_core::belief::{Belief, BeliefUpdate, Classical, SweptPush};
+use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{self, ViewArray, ViewId};
 use nudge_core::episode::{EpisodeConfig, EpisodeRecord, FORMAT, Judgement, StepOutcome, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason};
-use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
 use nudge_core::score::{Scores, object_verdicts};
+use nudge_core::skill::SweptManipulation;
+use nudge_core::skill::push::{PushSampler, sample};
 use nudge_core::world::{TruthMap, World};
 
 /// An episode with everything that it went through.
@@ -61,15 +62,16 @@ pub fn play(steps: usize) -> Played {
                         gain: feasible.then_some(900.0 - 7.0 * rank),
                         view: feasible.then_some(ViewId(rank as u16 * 3)),
                         reg: feasible.then_some(-3.0 * rank),
-                        ..CandidateRecord::of(c.swept.push)
+                        ..CandidateRecord::of(c.manipulation)
                     }
                 })
                 .collect();
             decision.best_push = candidates.iter().position(|c| c.rejection.is_none());
             if let Some(best) = decision.best_push {
-                let swept: SweptPush = candidates[best].swept.clone();
-                let prediction = Classical.predict_pushes(&belief, std::slice::from_ref(&swept)).remove(0);
-                decision.action = Action::Push(swept.push);
+                let (manipulation, swept) = (candidates[best].manipulation, candidates[best].swept.clone());
+                let swept = SweptManipulation { manipulation, swept };
+                let prediction = Classical.predict(&belief, &[swept.intervention(&belief)]).remove(0);
+                decision.action = Action::Manipulate(manipulation);
                 decision.reason = Reason::PushTellsMore;
                 let pushed = world.execute(&arm.arm, candidates[best].motion.as_ref().expect("of a feasible one"));
                 belief.apply(&prediction);
@@ -102,7 +104,7 @@ pub fn play(steps: usize) -> Played {
             seconds: StepSeconds::default(),
         };
         played.record.steps.push(step.clone());
-        let (swept, prediction, push_outcome) = match outcome {
+        let (swept, prediction, manipulated) = match outcome {
             Some((swept, prediction, pushed)) => (Some(swept), Some(prediction), Some(pushed)),
             None => (None, None, None),
         };
@@ -112,7 +114,7 @@ pub fn play(steps: usize) -> Played {
             observation,
             swept,
             prediction,
-            push_outcome,
+            manipulated,
             motion: None,
         });
         played.bodies.push(world.bodies());

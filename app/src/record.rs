@@ -30,7 +30,7 @@ use crate::picture;
 use crate::verdicts::Judged;
 use disk::{Disk, Fault};
 use nudge_core::arm::{ArmTool, Joints};
-use nudge_core::belief::{Belief, PushPrediction};
+use nudge_core::belief::{Belief, Prediction};
 use nudge_core::camera::{Frame, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, NO_TRUTH, StepOutcome, StepRecord};
 use nudge_core::grid::{Grid, VoxelSet};
@@ -283,7 +283,7 @@ impl Recorder {
             pose(&joints)?;
         }
         // The last row of a step is the one that its timeline shows.
-        let pushes = matches!(outcome.record.action, Action::Push(_));
+        let pushes = matches!(outcome.record.action, Action::Manipulate(_));
         let shown_s = robot::shown_at_s(arm, motion, &outcome.record.decision, pushes);
         if let Some(joints) = motion.at(shown_s) {
             self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + shown_s);
@@ -368,14 +368,17 @@ impl Recorder {
                 }
             }
         }
-        let push = match record.action {
-            Action::Push(push) => Some(shapes::chosen_push(&push)),
+        let done = match &record.action {
+            Action::Manipulate(manipulation) => Some(manipulation),
             Action::Look { .. } => None,
         };
-        self.log_or_clear(paths::PUSH_CHOSEN, push)?;
-        self.log_or_clear(paths::PUSH_SWEPT, outcome.swept.as_ref().map(|swept| voxels::swept(grid, &swept.swept)))?;
+        self.log_or_clear(paths::PUSH_CHOSEN, done.map(shapes::chosen))?;
+        let with_lines = done.filter(|done| !done.outline().lines.is_empty());
+        self.log_or_clear(paths::PUSH_LINES, with_lines.map(|done| shapes::chosen_lines(Some(done))))?;
+        let told = outcome.swept.as_ref();
+        self.log_or_clear(paths::PUSH_SWEPT, told.map(|told| voxels::swept(grid, &told.swept)))?;
         self.predicted(grid, outcome.prediction.as_ref())?;
-        let pushed = matches!(record.action, Action::Push(_));
+        let pushed = matches!(record.action, Action::Manipulate(_));
         let mark = rerun::Scalars::single(0.0);
         self.log_or_clear(&paths::score(paths::SCORE_PUSH), pushed.then_some(mark))?;
         self.log(paths::DECISION, &rerun::TextDocument::from_markdown(decision::markdown(setting, record)))?;
@@ -390,7 +393,7 @@ impl Recorder {
         self.log(paths::OBSERVATION_LABELS, &shapes::label_image(frame))
     }
 
-    fn predicted(&self, grid: &Grid, prediction: Option<&PushPrediction>) -> Result<()> {
+    fn predicted(&self, grid: &Grid, prediction: Option<&Prediction>) -> Result<()> {
         let at = [paths::PREDICTED_OCCUPANCY, paths::PREDICTED_SEMANTICS, paths::PREDICTED_CHANGE];
         let Some(prediction) = prediction else {
             return at.iter().try_for_each(|path| self.log(path, &rerun::Clear::flat()));

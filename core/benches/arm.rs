@@ -6,9 +6,9 @@ use nudge_core::arm::{Arm, ArmTool, DistanceField, Joints, PlanSettings, level_t
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, project, render};
 use nudge_core::grid::VoxelSet;
-use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng::stream;
 use nudge_core::scene::{Catalog, RobotPlacement, Scene};
+use nudge_core::skill::push::{PushSampler, sample};
 use nudge_core::world::{TruthMap, World};
 use parry3d::query::PointQuery;
 use parry3d::shape::Voxels;

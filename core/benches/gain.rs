@@ -4,7 +4,7 @@
 //! surfaces, 0.5 elsewhere), one of classical log-odds after ten views.
 
 use nalgebra::{Rotation3, Translation3, UnitQuaternion};
-use nudge_core::belief::{Belief, PushPrediction, bernoulli_entropy};
+use nudge_core::belief::{Belief, Prediction, bernoulli_entropy};
 use nudge_core::camera::{Intrinsics, View, ViewArray, ViewId};
 use nudge_core::gain::{
     Coverage, GainField, Openings, RayDensity, RayGains, best_pair, gain_of_views, informed_voxels,
@@ -65,7 +65,7 @@ fn report(name: &str, belief: &Belief, array: &ViewArray) {
     print_row("  by coverage, with the best pair", coverage, Some(0.30), "");
 
     let coarse: Vec<ViewId> = all.iter().copied().step_by(5).collect();
-    let pushes: Vec<PushPrediction> = (0..80).map(|index| prediction(belief, index)).collect();
+    let pushes: Vec<Prediction> = (0..80).map(|index| prediction(belief, index)).collect();
     let base = best_of(3, || drop(black_box(RayGains::new(&field, array, &coarse, RayDensity::COARSE))));
     let rays = RayGains::new(&field, array, &coarse, RayDensity::COARSE);
     let mut under: Vec<Vec<f32>> = Vec::new();
@@ -240,7 +240,7 @@ fn classical(grid: &Grid, array: &ViewArray, solid: &[bool]) -> Belief {
 
 /// A push from the front: a strip of 4 cm is swept free up to 12 cm, and what is near the path, in a window of 0.25 x
 /// 0.20 m, loses half of its evidence.
-fn prediction(belief: &Belief, index: u64) -> PushPrediction {
+fn prediction(belief: &Belief, index: u64) -> Prediction {
     let grid = &belief.grid;
     let mut rng = stream(2, "bench push", index);
     let (x, y) = (rng.random_range(0..grid.dims[0] - 50), rng.random_range(0..grid.dims[1] - 40));
@@ -258,7 +258,7 @@ fn prediction(belief: &Belief, index: u64) -> PushPrediction {
     }
     let cells: Vec<usize> = window.cells(grid).collect();
     let semantics = cells.iter().map(|&cell| belief.semantics[cell]).collect();
-    PushPrediction { window, occupancy, semantics, change: vec![0.5; cells.len()] }
+    Prediction { window, occupancy, semantics, change: vec![0.5; cells.len()] }
 }
 
 /// The design's 300 views.

@@ -7,12 +7,12 @@ mod median;
 
 use median::median;
 use nudge_core::arm::ArmTool;
-use nudge_core::belief::{Belief, SweptPush};
+use nudge_core::belief::{Belief, FloorPlan, Intervention, SOLID};
 use nudge_core::camera::{ViewArray, project, render};
 use nudge_core::cnabu;
-use nudge_core::push::{PushSampler, sample};
 use nudge_core::rng::stream;
 use nudge_core::scene::{Catalog, Scene};
+use nudge_core::skill::push::{PushSampler, sample};
 use std::path::Path;
 
 /// Candidates that a decision weighs.
@@ -35,13 +35,18 @@ fn main() {
 
     let tool = ArmTool::standard(scene.shelf);
     let drawn = sample(PushSampler::Frontier, &belief, None, &tool, CANDIDATES, &mut stream(1, "pushes", 0));
-    let feasible: Vec<SweptPush> = drawn.into_iter().filter(|c| c.rejection.is_none()).map(|c| c.swept).collect();
+    let solid = FloorPlan::new(&belief, SOLID);
+    let feasible: Vec<Intervention> = drawn
+        .into_iter()
+        .filter(|c| c.rejection.is_none())
+        .map(|c| c.manipulation.skill().intervention(&belief, &solid, c.swept))
+        .collect();
     assert!(!feasible.is_empty(), "no candidate of {} is feasible", scene.name);
     // As many as a decision weighs, whatever this belief offers: what one costs does not depend on which it is.
-    let pushes: Vec<SweptPush> = feasible.iter().cycle().take(CANDIDATES).cloned().collect();
+    let pushes: Vec<Intervention> = feasible.iter().cycle().take(CANDIDATES).cloned().collect();
     row(
         &format!("sigma_m, {CANDIDATES} candidates ({} different)", feasible.len()),
-        median(7, || update.predict_pushes(&belief, &pushes)),
+        median(7, || update.predict(&belief, &pushes)),
         0.8,
     );
 }

@@ -22,9 +22,8 @@ mod line;
 mod model;
 mod motion;
 mod numeric;
+mod phases;
 mod plan;
-mod push;
-mod pusher;
 mod reach;
 mod ready;
 mod rrt;
@@ -33,6 +32,7 @@ mod shapes;
 mod shortcut;
 mod space;
 mod sweep;
+mod tool;
 mod tree;
 mod urdf;
 
@@ -44,12 +44,12 @@ pub use joints::{Joints, MAX_JOINTS};
 pub use line::{Follow, LINE_STEP_M, SINGULARITY_MARGIN, follow_line};
 pub use model::{Arm, BodyPoses, Joint, JointKind, Part, Role};
 pub use motion::{Motion, Stop};
+pub use phases::{CONTACT_M_S, Phase, PhaseKind, PhasedMotion, WAY_BACK_M_S, WAY_IN_M_S};
 pub use plan::{PlanSettings, Planned, plan, retreat, turned};
-pub use push::Push;
-pub use pusher::{ArmTool, PUSH_M_S, PushMotion, WAY_BACK_M_S, WAY_IN_M_S};
 pub use reach::{Reach, YAWS_DEG};
-pub use ready::level_tool;
+pub use ready::{inclined_tool, level_tool};
 pub use space::{MAP_MARGIN_M, SHELF_MARGIN_M, Space};
+pub use tool::ArmTool;
 
 /// A rigid transform with the precision that kinematics needs; names say `to_from`, for example `world_from_tool`.
 pub type Frame = nalgebra::Isometry3<f64>;

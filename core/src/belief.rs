@@ -4,25 +4,24 @@
 //! natural-log entropy of the mean distribution (nats); epistemic uncertainty is `K / sum(a)` for a Dirichlet and
 //! the Beta's variance for a voxel (Marques et al., manipulation-enhanced mapping; Ulmer et al. 2023).
 
-mod carried;
 mod classical;
 mod floor;
+mod intervention;
 mod networks;
 mod sightings;
 
-#[cfg(feature = "cnabu")]
-pub(crate) use carried::Carried;
-pub(crate) use carried::SOLID;
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
+pub(crate) use intervention::Met;
+#[cfg(feature = "cnabu")]
+pub(crate) use intervention::Moved;
+pub use intervention::{Flow, Intervention, SOLID, Stroke};
 pub use networks::{NetworksUsed, Weights, short};
 pub use sightings::{CHANGED, LOOKS_TAKEN, NEWS_REACH_M, Sightings, look};
 
-use crate::arm::{Arm, Push};
 use crate::camera::MapObservation;
-use crate::grid::{Grid, VoxelSet, Window};
+use crate::grid::{Grid, Window};
 use crate::scene::{CLASS_COUNT, ClassId};
-use crate::world::PushOutcome;
 use rayon::prelude::*;
 
 /// A floor cell's certainty (largest class probability) above which it counts as known.
@@ -111,8 +110,8 @@ impl Belief {
         self.certain_share(CERTAIN) >= COMPLETE_SHARE
     }
 
-    /// Writes a push's prediction into the belief.
-    pub fn apply(&mut self, prediction: &PushPrediction) {
+    /// Writes the prediction for a manipulation into the belief.
+    pub fn apply(&mut self, prediction: &Prediction) {
         let height = self.grid.dims[2];
         for (at, cell) in prediction.window.cells(&self.grid).enumerate() {
             self.occupancy[self.grid.column(cell)]
@@ -150,17 +149,17 @@ pub fn dirichlet_vacuity(a: &[f32; CLASS_COUNT]) -> f32 {
     CLASS_COUNT as f32 / a.iter().sum::<f32>()
 }
 
-/// The belief that a push is predicted to leave, inside the window of the floor plan that it can touch; outside it
+/// The belief that a manipulation is predicted to leave, inside the window of the floor plan that it can touch; outside it
 /// nothing changes. Arrays are in the window's `[x][y]([z])` order, full height.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PushPrediction {
+pub struct Prediction {
     /// The columns that the prediction covers.
     pub window: Window,
     /// Posterior `[a_occ, a_free]` per voxel, already gated with the probability of change.
     pub occupancy: Vec<[f32; 2]>,
     /// Posterior Dirichlet per floor cell.
     pub semantics: Vec<[f32; CLASS_COUNT]>,
-    /// Probability per floor cell that the push changes it.
+    /// Probability per floor cell that the manipulation changes it.
     pub change: Vec<f32>,
 }
 
@@ -169,7 +168,7 @@ const SUREST: f32 = 0.01;
 /// The largest surprise of a floor cell, nats: the prediction gave at most 1 % to what happened.
 pub const MOST_SURPRISING: f32 = 4.605_17;
 
-impl PushPrediction {
+impl Prediction {
     /// The surprise of every floor cell: `-ln` of the predicted probability of what happened to it (changed or
     /// unchanged), nats, at most [`MOST_SURPRISING`]. Cells outside the window were predicted to stay.
     pub fn surprise(&self, grid: &Grid, changed: &[bool]) -> Vec<f32> {
@@ -184,7 +183,7 @@ impl PushPrediction {
         chance.iter().zip(changed).map(surprise).collect()
     }
 
-    /// `H_s(belief) - H_s(predicted)`, nats: negative when the push is predicted to make labels less certain. `belief`
+    /// `H_s(belief) - H_s(predicted)`, nats: negative when labels are predicted to become less certain. `belief`
     /// is the one that the prediction was made from; cells outside the window cancel out.
     pub fn semantic_entropy_drop(&self, belief: &Belief) -> f64 {
         self.window
@@ -198,31 +197,12 @@ impl PushPrediction {
     }
 }
 
-/// A push and the voxels that its tool sweeps.
-#[derive(Clone, Debug)]
-pub struct SweptPush {
-    /// The push.
-    pub push: Push,
-    /// Every voxel that gripper or links touch, approach included.
-    pub swept: VoxelSet,
-}
-
-impl SweptPush {
-    /// A push as far as the arm really came, with what it swept until then.
-    pub fn done(push: &Push, outcome: &PushOutcome, arm: &Arm, grid: &Grid) -> Self {
-        let mut swept = VoxelSet::empty(grid);
-        arm.sweep(&outcome.passed, grid, &mut swept);
-        let length_m = if outcome.stalled { outcome.pushed_m.min(push.length_m) } else { push.length_m };
-        Self { push: Push { length_m, ..*push }, swept }
-    }
-}
-
 /// Name of the classical update.
 pub const CLASSICAL: &str = "classical";
 /// Name of the networks' update ([`crate::cnabu`]).
 pub const CNABU: &str = "cnabu";
 
-/// How a belief changes with an observation (sigma_o) and how it is predicted to change with a push (sigma_m).
+/// How a belief changes with an observation (sigma_o) and how it is predicted to change with a manipulation (sigma_m).
 pub trait BeliefUpdate: Send + Sync {
     /// Name in episodes and reports: [`CLASSICAL`], [`CNABU`].
     fn name(&self) -> &str;
@@ -249,8 +229,9 @@ pub trait BeliefUpdate: Send + Sync {
     /// The belief after an observation: `lambda' = sigma_o(lambda, o)`. Episodes go through [`look`].
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief;
 
-    /// The beliefs that pushes are predicted to leave: `lambda' = sigma_m(lambda, push)`, one prediction per push.
-    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction>;
+    /// The beliefs that manipulations are predicted to leave: `lambda' = sigma_m(lambda, intervention)`, one prediction per
+    /// intervention.
+    fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction>;
 }
 
 #[cfg(test)]
@@ -334,7 +315,7 @@ mod tests {
         class[4] = 16.0;
         let mut other = [1.0; CLASS_COUNT];
         other[2] = 6.0;
-        let prediction = PushPrediction {
+        let prediction = Prediction {
             window: Window { x: [1, 3], y: [1, 2] },
             occupancy: (0..8).map(|i| [2.0 + i as f32, 1.0]).collect(),
             semantics: vec![other, class],

@@ -1,4 +1,4 @@
-//! Where images come from and pushes go: a simulated shelf, a recording, a robot.
+//! Where images come from and motions go: a simulated shelf, a recording, a robot.
 //!
 //! An [`Episode`](crate::episode::Episode) knows its surroundings only through [`Environment`]. It asks for a frame from a
 //! view, has a motion carried out and is told what happened; if the surroundings know the truth, it is scored. Whatever can
@@ -9,9 +9,9 @@ mod simulated;
 pub use simulated::Simulated;
 
 use crate::Result;
-use crate::arm::{Arm, PushMotion};
+use crate::arm::{Arm, PhasedMotion};
 use crate::camera::{Intrinsics, Sensed, View};
-use crate::world::{PushOutcome, TruthMap};
+use crate::world::{ManipulationOutcome, TruthMap};
 
 /// What an episode maps.
 pub trait Environment: Send + Sync {
@@ -23,12 +23,12 @@ pub trait Environment: Send + Sync {
     /// For a view from which there is no frame.
     fn frame(&mut self, view: &View, intrinsics: &Intrinsics) -> Result<Sensed>;
 
-    /// Carries out a push by the arm: in, along the push, back. What an environment does not know of the objects (their
+    /// Carries out a motion of the arm, phase by phase. What an environment does not know of the objects (their
     /// displacements, contacts and drops) it leaves empty.
     ///
     /// # Errors
     /// Where the motion could not be begun.
-    fn carry_out(&mut self, arm: &Arm, motion: &PushMotion) -> Result<PushOutcome>;
+    fn carry_out(&mut self, arm: &Arm, motion: &PhasedMotion) -> Result<ManipulationOutcome>;
 
     /// What is really there now, if that is known. `None` once is `None` always.
     fn truth(&self) -> Option<&TruthMap>;

@@ -14,7 +14,7 @@ pub(crate) fn parse<T: Copy + Display>(all: &[T], text: &str) -> Result<T, Strin
 #[cfg(test)]
 mod tests {
     use crate::plan::Counted;
-    use crate::push::PushSampler;
+    use crate::skill::PushSampler;
 
     #[test]
     fn names_are_read_back_and_others_are_answered_with_them() {

@@ -22,19 +22,19 @@ pub use gain::Gain;
 pub use policy::PolicyKind;
 pub use rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
 pub use settings::{Choice, GAMMA, Place, PlannerSettings, SETTINGS, Setting, Values};
-pub use weigh::{disturbance, draw_pushes};
+pub use weigh::{disturbance, draw_candidates};
 pub(crate) use worth::coarse;
 pub use worth::{COARSE_VIEWS, Sources};
 
-use crate::arm::{ArmTool, Push, PushMotion};
+use crate::arm::{ArmTool, PhasedMotion};
 use crate::belief::{Belief, BeliefUpdate};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
-use crate::push::{PushTruth, Rejection};
+use crate::skill::{Ground, Manipulation, PushTruth, Rejection};
 use serde::{Deserialize, Serialize};
 
-/// What the robot does at one step.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What the robot does at one step. In files `kind` is `look` or the name of a skill.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Action {
     /// Take an image from a view.
@@ -42,8 +42,27 @@ pub enum Action {
         /// The view's id in the array.
         view: ViewId,
     },
-    /// Push.
-    Push(Push),
+    /// Move something, by one of the skills.
+    #[serde(untagged)]
+    Manipulate(Manipulation),
+}
+
+impl<'de> Deserialize<'de> for Action {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        use serde::de::Error as _;
+        let fields = serde_json::Map::<String, serde_json::Value>::deserialize(deserializer)?;
+        match fields.get("kind").and_then(serde_json::Value::as_str) {
+            None => Err(D::Error::missing_field("kind")),
+            Some("look") => {
+                let view = fields.get("view").cloned().ok_or_else(|| D::Error::missing_field("view"))?;
+                Ok(Self::Look { view: serde_json::from_value(view).map_err(D::Error::custom)? })
+            }
+            Some(_) => {
+                let manipulation = Manipulation::deserialize(serde_json::Value::Object(fields));
+                manipulation.map(Self::Manipulate).map_err(D::Error::custom)
+            }
+        }
+    }
 }
 
 /// Why an action was chosen, in one of the planner's own cases.
@@ -79,12 +98,12 @@ pub enum Reason {
     Manual,
 }
 
-/// One push candidate as the planner saw it.
+/// One candidate to move something as the planner saw it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CandidateRecord {
-    /// The push.
+    /// The manipulation.
     #[serde(flatten)]
-    pub push: Push,
+    pub manipulation: Manipulation,
     /// Why it was not a candidate, if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rejection: Option<Rejection>,
@@ -102,9 +121,15 @@ pub struct CandidateRecord {
 }
 
 impl CandidateRecord {
-    /// A push that was neither weighed nor rejected.
-    pub fn of(push: Push) -> Self {
-        Self { push, rejection: None, gain: None, view: None, reg: None, motion_s: None }
+    /// A manipulation that was neither weighed nor rejected.
+    pub fn of(manipulation: impl Into<Manipulation>) -> Self {
+        let manipulation = manipulation.into();
+        Self { manipulation, rejection: None, gain: None, view: None, reg: None, motion_s: None }
+    }
+
+    /// What stood against it, in words; `None` for a feasible candidate.
+    pub fn against(&self) -> Option<String> {
+        self.rejection.as_ref().map(|rejection| self.manipulation.against(rejection))
     }
 }
 
@@ -134,7 +159,7 @@ pub struct Decision {
     pub best_push: Option<usize>,
     /// The arm's motion for the push that is the action, else for the best one; `None` where none was weighed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub motion: Option<PushMotion>,
+    pub motion: Option<PhasedMotion>,
     /// The policy and the thresholds of its comparison; `None` until an episode takes it down.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rule: Option<Rule>,
@@ -193,11 +218,11 @@ impl History {
                 self.used_views.push(view);
                 self.best_gains.extend(decision.best_gain());
             }
-            Action::Push(push) => {
+            Action::Manipulate(done) => {
                 self.used_views.clear();
                 if !dropped {
                     let best = decision.best_push.and_then(|at| decision.candidates.get(at));
-                    self.view_of_push = best.filter(|best| best.push == push).and_then(|best| best.view);
+                    self.view_of_push = best.filter(|best| best.manipulation == done).and_then(|best| best.view);
                 }
             }
         }
@@ -205,7 +230,7 @@ impl History {
 
     /// Looks since the last push; `None` before the first one.
     pub fn looks_since_push(&self) -> Option<usize> {
-        self.actions.iter().rev().position(|action| matches!(action, Action::Push(_)))
+        self.actions.iter().rev().position(|action| matches!(action, Action::Manipulate(_)))
     }
 
     /// Whether the last action was a push.
@@ -236,11 +261,17 @@ pub struct Situation<'a> {
     pub seed: u64,
     /// The belief after really looking from a view: for the clairvoyant oracle only.
     pub really_look: &'a (dyn Fn(ViewId) -> Belief + Sync),
-    /// What pushes would really do, one answer per motion: for clairvoyant policies only.
-    pub really_push: &'a (dyn Fn(&[PushMotion]) -> Vec<PushTruth> + Sync),
+    /// What manipulations would really do, one answer per motion: for clairvoyant policies only.
+    pub really_push: &'a (dyn Fn(&[PhasedMotion]) -> Vec<PushTruth> + Sync),
 }
 
 impl Situation<'_> {
+    /// What candidates are drawn from.
+    fn ground(&self, settings: &PlannerSettings) -> Ground<'_> {
+        let seen = settings.counted.left_out(self.seen);
+        Ground { belief: self.belief, seen, arm: self.arm, sampler: settings.push_sampler }
+    }
+
     /// The views that are offered, by id.
     pub fn offered(&self) -> Vec<ViewId> {
         self.views.views.iter().map(|view| view.id).filter(|view| !self.unreachable.contains(view)).collect()

@@ -1,7 +1,7 @@
 //! What pushes are worth: beside what the planner promised of each candidate, what it really does.
 //!
 //! An episode is gone through again up to a decision, so that the world stands as it stood; there every feasible push
-//! candidate is carried out in a copy of the world ([`crate::push::Counterfactual`]). Over the candidates of a decision
+//! candidate is carried out in a copy of the world ([`crate::skill::Counterfactual`]). Over the candidates of a decision
 //! two questions are answered, once for the objects that pushes bring into sight (won minus lost) and once for the space that
 //! they open ([`Measure`]):
 //!
@@ -14,13 +14,13 @@ mod summary;
 
 pub use summary::{Measure, MeasureSummary, StepSummary};
 
-use crate::arm::{Push, PushMotion};
+use crate::arm::PhasedMotion;
 use crate::belief::BeliefUpdate;
 use crate::episode::{Difference, Episode, EpisodeDir, EpisodeRecord, NO_TRUTH, StepRecord, StoredTruth, revisit};
 use crate::plan::{Action, CandidateRecord, Reason, ranked};
-use crate::push::{ArmClearance, PushTruth};
 use crate::rng::stream;
 use crate::scene::Catalog;
+use crate::skill::{ArmClearance, Manipulation, PushTruth};
 use crate::world::TruthMap;
 use crate::{Error, Result};
 use serde::Serialize;
@@ -36,9 +36,9 @@ const SAME_M: f64 = 1e-6;
 pub struct ProbedPush {
     /// Its position among the decision's candidates.
     pub candidate: usize,
-    /// The push.
+    /// The manipulation.
     #[serde(flatten)]
-    pub push: Push,
+    pub manipulation: Manipulation,
     /// What the planner promised, nats; `None` where it weighed none (pushes at random).
     pub promised_gain: Option<f32>,
     /// What it expected to blur, nats, at most 0.
@@ -168,14 +168,14 @@ pub fn probe(
 pub fn probe_step(episode: &Episode, logged: &StepRecord, carried_out: &(dyn Fn() + Sync)) -> Option<StepProbe> {
     let decision = &logged.decision;
     let known = episode.counterfactual()?;
-    let (at, motions): (Vec<usize>, Vec<PushMotion>) = motions(episode, logged).into_iter().unzip();
+    let (at, motions): (Vec<usize>, Vec<PhasedMotion>) = motions(episode, logged).into_iter().unzip();
     let truths = known.of_each(&motions, carried_out);
     let pushes: Vec<ProbedPush> =
         at.iter().zip(truths).map(|(&at, truth)| probed(episode, at, &decision.candidates[at], truth)).collect();
     let position = |candidate: Option<usize>| pushes.iter().position(|push| Some(push.candidate) == candidate);
     let made = match logged.action {
         Action::Look { .. } => None,
-        Action::Push(push) => pushes.iter().position(|probed| probed.push == push),
+        Action::Manipulate(done) => pushes.iter().position(|probed| probed.manipulation == done),
     };
     Some(StepProbe {
         step: logged.index,
@@ -199,18 +199,18 @@ fn feasible(step: &StepRecord) -> impl Iterator<Item = (usize, &CandidateRecord)
 
 /// The arm's motion for every feasible candidate: the one that the log keeps; else the one with which the candidate is
 /// drawn again; else, where the belief is not quite that of the log, one planned anew. Candidates without any are left out.
-fn motions(episode: &Episode, logged: &StepRecord) -> Vec<(usize, PushMotion)> {
+fn motions(episode: &Episode, logged: &StepRecord) -> Vec<(usize, PhasedMotion)> {
     let (tool, seed) = (episode.arm(), episode.record().config.seed);
-    let drawn = episode.draw_pushes();
+    let drawn = episode.draw_candidates();
     let clearance = ArmClearance::new(tool, episode.belief());
     let of = |(at, candidate): (usize, &CandidateRecord)| {
-        let push = &candidate.push;
-        let kept = |motion: &&PushMotion| tool.ready.is_some_and(|ready| motion.carries_out(&tool.arm, &ready, push));
+        let skill = candidate.manipulation.skill();
+        let kept = |motion: &&PhasedMotion| tool.ready.is_some_and(|ready| skill.is_done_by(motion, &tool.arm, &ready));
         let again = || {
-            let drawn = drawn.get(at).filter(|drawn| drawn.swept.push == *push);
+            let drawn = drawn.get(at).filter(|drawn| drawn.manipulation == candidate.manipulation);
             drawn.and_then(|drawn| drawn.motion.clone())
         };
-        let anew = || clearance.motion(push, &clearance.target_of(push), &mut stream(seed, "probe", at as u64)).ok();
+        let anew = || skill.plan(&clearance, &mut stream(seed, "probe", at as u64)).ok();
         let motion = logged.decision.motion.as_ref().filter(kept).cloned().or_else(again).or_else(anew)?;
         Some((at, motion))
     };
@@ -222,7 +222,7 @@ fn probed(episode: &Episode, candidate: usize, promised: &CandidateRecord, truth
     let opened_voxels = truth.opened.len();
     ProbedPush {
         candidate,
-        push: promised.push,
+        manipulation: promised.manipulation,
         promised_gain: promised.gain,
         promised_reg: promised.reg,
         opened_voxels,

@@ -1,12 +1,12 @@
-//! The simulated scene (rapier3d): bodies settle, a push is executed by the arm as kinematic bodies, drops are
-//! detected. Deterministic: the same scene and the same pushes give the same poses, bit for bit, on one machine.
+//! The simulated scene (rapier3d): bodies settle, a motion is carried out by the arm as kinematic bodies, drops are
+//! detected. Deterministic: the same scene and the same motions give the same poses, bit for bit, on one machine.
 
-mod arm;
 mod hull;
+mod manipulate;
 mod physics;
 mod truth;
 
-pub use arm::LinkContact;
+pub use manipulate::LinkContact;
 pub use truth::TruthMap;
 
 use crate::arm::Joints;
@@ -55,20 +55,20 @@ pub struct Standing {
     pub dropped: bool,
 }
 
-/// What a push did.
+/// What a manipulation did.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct PushOutcome {
+pub struct ManipulationOutcome {
     /// How far each object's origin moved, metres, in the order of the bodies that the world was made of; for a drop
     /// to where it was when it had fallen past the board, 0 for objects dropped earlier.
     pub displacement_m: Vec<f32>,
-    /// Objects that left the board during this push.
+    /// Objects that left the board on the way.
     pub dropped: Vec<ObjectId>,
     /// Simulated time, seconds.
     pub duration_s: f32,
-    /// Whether the arm was blocked (objects jammed against the shelf) and gave up before the push's end.
+    /// Whether the arm was blocked (objects jammed against the shelf) and gave up before the contact's end.
     pub stalled: bool,
-    /// How far the tip really moved along the push, metres.
-    pub pushed_m: f32,
+    /// How far the tip really moved in contact, metres.
+    pub way_m: f32,
     /// Objects that a link of the arm touched, which only the gripper should; each once per link.
     pub link_contacts: Vec<LinkContact>,
     /// Objects that the arm pressed against a wall of the shelf.

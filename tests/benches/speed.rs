@@ -6,14 +6,14 @@
 mod median;
 
 use median::median;
-use nudge_core::arm::{ArmTool, Push, PushMotion};
+use nudge_core::arm::{ArmTool, PhasedMotion};
 use nudge_core::belief::{Belief, BeliefUpdate, Classical};
 use nudge_core::camera::{ViewArray, ViewId, project, render};
 use nudge_core::episode::{Episode, EpisodeConfig};
 use nudge_core::plan::{PlannerSettings, PolicyKind};
-use nudge_core::push::ArmClearance;
 use nudge_core::rng::stream;
 use nudge_core::scene::{Body, Catalog, GenerateConfig, Scene, generate};
+use nudge_core::skill::{ArmClearance, Push, Skill};
 use nudge_core::world::{TruthMap, World};
 use nudge_tests::{nudge_bin, root};
 use std::process::Command;
@@ -83,10 +83,10 @@ fn push(scene: &Scene, bodies: &[Body]) -> f64 {
     world.settle();
     let (arm, belief) = (ArmTool::standard(scene.shelf), Belief::uniform(scene.grid()));
     let clearance = ArmClearance::new(&arm, &belief);
-    let motions: Vec<PushMotion> = (0..9)
+    let motions: Vec<PhasedMotion> = (0..9)
         .filter_map(|at| {
             let push = Push { start: [-0.2 + 0.05 * at as f32, 0.05, 0.06], direction_deg: 90.0, length_m: 0.15 };
-            clearance.motion(&push, &clearance.target_of(&push), &mut stream(1, "bench", at)).ok()
+            push.plan(&clearance, &mut stream(1, "bench", at)).ok()
         })
         .collect();
     let mut at = 0;

@@ -129,7 +129,8 @@ fn no_file_is_longer_than_500_lines_and_half_have_at_most_160() {
 fn what_is_added_is_added_in_the_files_that_are_listed() {
     let rows = table("| to add | like | named as | files |");
     let named: Vec<&str> = rows.iter().map(|row| row[0].as_str()).collect();
-    for kind in ["a policy", "a planner setting", "a belief update", "a panel", "a layout"] {
+    for kind in ["a policy", "a planner setting", "a belief update", "a skill", "an environment", "a panel", "a layout"]
+    {
         assert!(named.contains(&kind), "nothing tells how to add {kind}");
     }
     let crates = ["core", "app"].map(|of| (of, sources(of)));

@@ -168,7 +168,7 @@ impl EpisodeResult {
 
     /// Number of pushes.
     pub fn pushes(&self) -> usize {
-        self.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).count()
+        self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).count()
     }
 
     /// Number of pushes that dropped something.
@@ -193,7 +193,7 @@ impl StepResult {
         let judgement = step.judgement.as_ref()?;
         let gain = match step.action {
             Action::Look { .. } => step.decision.promised(),
-            Action::Push(_) => None,
+            Action::Manipulate(_) => None,
         };
         Some(Self {
             action: step.action,

@@ -4,14 +4,21 @@ use super::{print, to_json, warn};
 use crate::picture;
 use nudge_core::Error;
 use nudge_core::arm::{Arm, ArmTool, JointKind, Reach};
+use nudge_core::belief::{CLASSICAL, Classical};
 use nudge_core::camera::{View, ViewArray};
-use nudge_core::push::TOOL_HEIGHT_M;
+use nudge_core::episode::{Episode, EpisodeConfig};
+use nudge_core::plan::{PlannerSettings, PolicyKind};
 use nudge_core::scene::{Catalog, RobotFile, RobotPlacement, Scene, Shelf};
+use nudge_core::skill::push::TOOL_HEIGHT_M;
+use nudge_core::skill::{SkillKind, SkillSet};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::sync::Arc;
 
+/// After so many looks, with the classical belief, it is counted what each skill can do in a scene.
+const LOOKS: usize = 6;
 /// Distance of the places that are tried in the shelf, metres.
 const STEP_M: f32 = 0.02;
 
@@ -32,7 +39,8 @@ enum Command {
 struct CheckArgs {
     /// The arm's URDF file
     file: PathBuf,
-    /// Scene whose shelf it stands before, where the scene's [robot] has it [default: the standard shelf and place]
+    /// Scene whose shelf it stands before, where the scene's [robot] has it; after six looks it is counted what each skill
+    /// can do there [default: the standard shelf and place]
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Its link at the finger tip, z ahead, x along the gripper's broad side [default: `tool` or another usual name]
@@ -72,6 +80,18 @@ struct Report {
     waits_at: Option<Vec<f64>>,
     reach: ReachReport,
     views: Vec<ViewsReport>,
+    /// What each skill can do in the scene; empty without one.
+    skills: Vec<SkillReport>,
+}
+
+/// The candidates of a skill, and what stops the others.
+#[derive(Serialize)]
+struct SkillReport {
+    skill: &'static str,
+    drawn: usize,
+    feasible: usize,
+    /// Number of rejected candidates, by reason.
+    rejected: BTreeMap<String, usize>,
 }
 
 #[derive(Serialize)]
@@ -106,13 +126,15 @@ struct ViewsReport {
 /// What is wrong with the file or the scene; [`Error::Check`] for an arm that reaches nothing.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let Command::Check(args) = &args.command;
-    let (shelf, placement) = match &args.scene {
+    let mut scene = None;
+    if let Some(path) = &args.scene {
+        let (loaded, warnings) = Scene::load(path, &Catalog::standard())?;
+        warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", path.display())));
+        scene = Some(loaded);
+    }
+    let (shelf, placement) = match &scene {
         None => (Shelf::new([0.80, 0.40, 0.40]), RobotPlacement::default()),
-        Some(path) => {
-            let (scene, warnings) = Scene::load(path, &Catalog::standard())?;
-            warnings.iter().for_each(|warning| warn(&format!("{}: {warning}", path.display())));
-            (scene.shelf, scene.robot)
-        }
+        Some(scene) => (scene.shelf, scene.robot.clone()),
     };
     let arrays = args.views.iter().map(|name| ViewArray::named(name)).collect::<Result<Vec<_>, _>>()?;
     let mut urdf = RobotFile::read(&args.file, args.file.to_string_lossy())?;
@@ -126,7 +148,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let hands = array.hand_poses(&tool);
         views.push(array.views.iter().cloned().zip(hands.iter().map(Option::is_some)).collect());
     }
-    let report = report(args, &placement, &tool, &reach, &arrays, &views);
+    let mut report = report(args, &placement, &tool, &reach, &arrays, &views);
+    if let (Some(scene), Some(_)) = (scene, tool.ready) {
+        report.skills = skills(Scene { robot: placement, ..scene })?;
+    }
     if let (Some(out), Some(array), Some(views)) = (&args.out, arrays.first(), views.first()) {
         let joints = tool.ready.unwrap_or_else(|| nudge_core::arm::Joints::zero(tool.arm.joints.len()));
         let placed = picture::Placed { arm: &tool, joints, reach: &reach, intrinsics: &array.intrinsics, views };
@@ -185,7 +210,38 @@ fn report(
         waits_at: tool.ready.map(|joints| joints.to_vec()),
         reach: ReachReport { height_m: TOOL_HEIGHT_M, share: reach.share(), depth_m: reach.depth_m() },
         views: arrays.iter().zip(views).map(of_array).collect(),
+        skills: Vec::new(),
     }
+}
+
+/// What each skill can do in a scene after some looks.
+fn skills(scene: Scene) -> nudge_core::Result<Vec<SkillReport>> {
+    let planner = PlannerSettings { skills: SkillSet::of(SkillKind::ALL), ..PlannerSettings::of_belief(CLASSICAL) };
+    let config = EpisodeConfig {
+        policy: PolicyKind::MemNoPush,
+        belief: CLASSICAL.to_owned(),
+        seed: 0,
+        budget: LOOKS + 1,
+        views: "standard300".to_owned(),
+        planner,
+        noise: None,
+    };
+    let mut episode = Episode::new(scene, Arc::new(Catalog::standard()), config, Arc::new(Classical))?;
+    for _ in 0..LOOKS {
+        let decision = episode.decide();
+        episode.act(decision)?;
+    }
+    let drawn = episode.draw_candidates();
+    let of = |kind: &SkillKind| {
+        let mine = || drawn.iter().filter(move |candidate| candidate.manipulation.kind() == *kind);
+        let mut rejected = BTreeMap::new();
+        for rejection in mine().filter_map(|candidate| candidate.rejection.as_ref()) {
+            *rejected.entry(rejection.kind_words(*kind)).or_default() += 1;
+        }
+        let feasible = mine().filter(|candidate| candidate.rejection.is_none()).count();
+        SkillReport { skill: kind.name(), drawn: mine().count(), feasible, rejected }
+    };
+    Ok(SkillKind::ALL.iter().map(of).collect())
 }
 
 fn table(report: &Report) -> String {
@@ -224,6 +280,15 @@ fn table(report: &Report) -> String {
     for views in &report.views {
         let _ = writeln!(text, "  views      {} of {} in {}", views.reachable.len(), views.views, views.array);
         for (words, count) in &views.faults {
+            let _ = writeln!(text, "             {count} not: {words}");
+        }
+    }
+    for skill in &report.skills {
+        let SkillReport { skill, drawn, feasible, rejected } = skill;
+        let _ = writeln!(text, "  {skill:<10} {feasible} of {drawn} drawn are feasible after {LOOKS} looks");
+        let mut rejected: Vec<_> = rejected.iter().collect();
+        rejected.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
+        for (words, count) in rejected {
             let _ = writeln!(text, "             {count} not: {words}");
         }
     }

@@ -157,7 +157,7 @@ fn go_on(driver: &mut Driver, progress: Progress, show: &mut dyn FnMut(&StepReco
         let decision = driver.decide();
         progress.doing(match decision.action {
             Action::Look { .. } => "looking",
-            Action::Push(_) => "pushing",
+            Action::Manipulate(_) => "pushing",
         });
         let outcome = driver.act(decision)?;
         progress.suspend(|| show(&outcome.record));
@@ -222,6 +222,7 @@ fn same_episode(
 mod tests {
     use super::*;
     use nudge_core::plan::{SETTINGS, Values};
+    use nudge_core::skill::{SkillKind, SkillSet};
 
     /// An episode whose gamma was another one was gone on with, without a word.
     #[test]
@@ -236,6 +237,7 @@ mod tests {
                 Values::Whole { range: [_, high], .. } => high.to_string(),
                 Values::Real { range: [_, high], .. } => high.to_string(),
                 Values::Choice { choices, .. } => choices[1].name.to_owned(),
+                Values::Skills { .. } => SkillSet::of(SkillKind::ALL).to_string(),
             };
             let mut planner = config.planner;
             setting.set(&mut planner, &other).expect("allowed");

@@ -2,6 +2,7 @@
 
 use nudge_core::belief::{CLASSICAL, CNABU};
 use nudge_core::plan::{PlannerSettings, SETTINGS, Setting, Values};
+use nudge_core::skill::SkillKind;
 use serde_json::{Value, json};
 
 /// What was typed.
@@ -32,6 +33,7 @@ fn document(setting: &Setting) -> Value {
         Values::Choice { choices, .. } => {
             json!({ "kind": "choice", "choices": choices.iter().map(|choice| choice.name).collect::<Vec<_>>() })
         }
+        Values::Skills { .. } => json!({ "kind": "names", "choices": SkillKind::NAMES }),
     };
     let default = |belief: &str| {
         let text = setting.value(&PlannerSettings::of_belief(belief));

@@ -149,8 +149,9 @@ fn push_arrows(svg: &mut Svg, summary: &Summary<'_>, [left, top]: [f32; 2], heig
         [left + x / 10.0, top + y / 10.0]
     };
     for step in &summary.record.steps {
-        let Action::Push(push) = step.action else { continue };
-        let (from, to) = (place(push.start_point()), place(push.end_point()));
+        let Action::Manipulate(manipulation) = step.action else { continue };
+        let arrow = manipulation.arrow();
+        let (from, to) = (place(arrow.start), place(arrow.end()));
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy).max(1e-3);
         let (ux, uy) = (dx / length, dy / length);
@@ -316,7 +317,7 @@ fn class_legend(summary: &Summary<'_>, width: f32) -> Legend {
 }
 
 fn push_steps(record: &EpisodeRecord) -> Vec<usize> {
-    let pushed = |action: &Action| matches!(action, Action::Push(_));
+    let pushed = |action: &Action| matches!(action, Action::Manipulate(_));
     record.steps.iter().filter(|step| pushed(&step.action)).map(|step| step.index).collect()
 }
 

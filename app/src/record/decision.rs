@@ -3,8 +3,8 @@
 use super::Setting;
 use nudge_core::episode::StepRecord;
 use nudge_core::plan::{Action, CandidateRecord, Comparison, Decision, Term, TermKind, Winner};
-use nudge_core::push::Rejection;
 use nudge_core::score::Scores;
+use nudge_core::skill::{Manipulation, Rejection, SkillKind, Unit};
 use std::fmt::Write as _;
 
 /// One score over the steps.
@@ -103,7 +103,8 @@ pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
     let mut words: Vec<String> = record.dropped().iter().map(|name| format!("dropped {name}")).collect();
     if let Some(push) = &record.push {
         if push.stalled {
-            words.push(format!("the arm was blocked after {} of its push", length(record).unwrap_or_default()));
+            let name = manipulated(record).map_or("way", |manipulation| manipulation.kind().name());
+            words.push(format!("the arm was blocked after {} of its {name}", length(record).unwrap_or_default()));
         }
         words.extend(push.contacts.iter().map(|touch| format!("the arm's {} touched {}", touch.link, touch.object)));
         words.extend(push.against_wall.iter().map(|name| format!("{name} was pressed against a wall")));
@@ -111,10 +112,17 @@ pub(crate) fn mishaps(record: &StepRecord) -> Vec<String> {
     words
 }
 
-/// How far a push went of what was planned: `50 of 140 mm`; of an episode that does not tell, what was planned.
+/// The manipulation that a step did.
+fn manipulated(record: &StepRecord) -> Option<Manipulation> {
+    match record.action {
+        Action::Manipulate(manipulation) => Some(manipulation),
+        Action::Look { .. } => None,
+    }
+}
+
+/// How far a manipulation went of what was planned: `50 of 140 mm`; of an episode that does not tell, what was planned.
 pub(crate) fn length(record: &StepRecord) -> Option<String> {
-    let Action::Push(planned) = record.action else { return None };
-    let planned_mm = planned.length_m * 1e3;
+    let planned_mm = manipulated(record)?.skill().way_m() * 1e3;
     Some(match &record.push {
         Some(push) => format!("{:.0} of {planned_mm:.0} mm", push.pushed_m * 1e3),
         None => format!("{planned_mm:.0} mm"),
@@ -125,7 +133,7 @@ pub(crate) fn length(record: &StepRecord) -> Option<String> {
 pub(crate) fn action(action: &Action) -> String {
     match action {
         Action::Look { view } => format!("look from view {}", view.0),
-        Action::Push(push) => format!("push {:.0} mm towards {:.0}°", push.length_m * 1e3, push.direction_deg),
+        Action::Manipulate(manipulation) => manipulation.describe().words,
     }
 }
 
@@ -141,7 +149,9 @@ pub fn markdown(setting: &Setting<'_>, record: &StepRecord) -> String {
     );
     weighed(&mut page, &decision.comparison());
     views(&mut page, setting, decision);
-    pushes(&mut page, decision);
+    for kind in SkillKind::ALL {
+        manipulations(&mut page, decision, *kind);
+    }
     let Some(scores) = record.scores() else {
         let entropy = thousands(record.entropy_nats);
         let _ = write!(page, "**After the step**\n\n| entropy, nats |\n|--:|\n| {entropy} |\n");
@@ -196,42 +206,51 @@ fn views(page: &mut String, setting: &Setting<'_>, decision: &Decision) {
     page.push_str("\n● best pair\n\n");
 }
 
-fn pushes(page: &mut String, decision: &Decision) {
-    if decision.candidates.is_empty() {
+/// The candidates of a skill.
+fn manipulations(page: &mut String, decision: &Decision, kind: SkillKind) {
+    let ranked = decision.ranked_candidates().into_iter().map(|at| (at, &decision.candidates[at]));
+    let all: Vec<(usize, &CandidateRecord)> = ranked.filter(|(_, c)| c.manipulation.kind() == kind).collect();
+    if all.is_empty() {
         return;
     }
-    let ranked = decision.ranked_candidates().into_iter();
-    let feasible: Vec<(usize, &CandidateRecord)> =
-        ranked.map(|at| (at, &decision.candidates[at])).filter(|(_, c)| c.rejection.is_none()).collect();
-    let count = |is: fn(&Rejection) -> bool| {
-        decision.candidates.iter().filter(|c| c.rejection.as_ref().is_some_and(is)).count()
-    };
+    let feasible: Vec<_> = all.iter().filter(|(_, c)| c.rejection.is_none()).collect();
+    let count = |is: fn(&Rejection) -> bool| all.iter().filter(|(_, c)| c.rejection.as_ref().is_some_and(is)).count();
     let _ = write!(
         page,
-        "**Pushes**: {} drawn, {} feasible; {} without a target, {} out of reach, {} blocked, {} without a free way\n\n",
-        decision.candidates.len(),
+        "**{}**: {} drawn, {} feasible; {} without a target, {} out of reach, {} blocked, {} without a free way\n\n",
+        capital(kind.plural()),
+        all.len(),
         feasible.len(),
         count(|r| matches!(r, Rejection::NoTarget)),
         count(|r| matches!(r, Rejection::Unreachable { .. })),
         count(|r| matches!(r, Rejection::ArmBlocked { .. })),
         count(|r| matches!(r, Rejection::NoWay)),
     );
-    reasons(page, decision);
-    if feasible.is_empty() {
-        return;
+    reasons(page, all.iter().filter_map(|(_, c)| c.rejection.as_ref().map(|rejection| rejection.kind_words(kind))));
+    let Some((_, first)) = feasible.first() else { return };
+    let (mut numbers, mut lines) = (String::new(), String::new());
+    for parameter in &first.manipulation.describe().parameters {
+        let unit = if parameter.unit == Unit::Metres { " (m)" } else { "" };
+        let _ = write!(numbers, " {}{unit} |", parameter.name);
+        lines.push_str("--:|");
     }
-    page.push_str(
-        "| push | from x, y (m) | towards | length | arm | gain | Reg | value, nats |\n|--:|:--|--:|--:|--:|--:|--:|--:|\n",
-    );
+    let name = kind.name();
+    let _ = write!(page, "| {name} |{numbers} arm | gain | Reg | value, nats |\n|--:|{lines}--:|--:|--:|--:|\n");
     let nats = |value: Option<f32>| value.map_or("–".to_owned(), |value| format!("{value:.1}"));
     for (at, c) in feasible.iter().take(LISTED) {
         let best = if decision.best_push == Some(*at) { " ●" } else { "" };
-        let [x, y, _] = c.push.start;
+        let _ = write!(page, "| {at}{best} |");
+        for parameter in c.manipulation.describe().parameters {
+            let unit = match parameter.unit {
+                Unit::Metres => "",
+                Unit::Millimetres => " mm",
+                Unit::Degrees => "°",
+            };
+            let _ = write!(page, " {}{unit} |", parameter.number());
+        }
         let _ = writeln!(
             page,
-            "| {at}{best} | {x:.2}, {y:.2} | {:.0}° | {:.0} mm | {:.1} s | {} | {} | {} |",
-            c.push.direction_deg,
-            c.push.length_m * 1e3,
+            " {:.1} s | {} | {} | {} |",
             c.motion_s.unwrap_or(0.0),
             nats(c.gain),
             nats(c.reg),
@@ -242,10 +261,10 @@ fn pushes(page: &mut String, decision: &Decision) {
 }
 
 /// The commonest reasons why candidates were rejected.
-fn reasons(page: &mut String, decision: &Decision) {
+fn reasons(page: &mut String, rejections: impl Iterator<Item = String>) {
     let mut counts = std::collections::BTreeMap::<String, usize>::new();
-    for rejection in decision.candidates.iter().filter_map(|candidate| candidate.rejection.as_ref()) {
-        *counts.entry(rejection.kind_words()).or_default() += 1;
+    for words in rejections {
+        *counts.entry(words).or_default() += 1;
     }
     let mut counts: Vec<(String, usize)> = counts.into_iter().collect();
     counts.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
@@ -277,9 +296,10 @@ pub(crate) fn thousands(number: f64) -> String {
 mod tests {
     use super::*;
     use crate::fixture;
-    use nudge_core::arm::{ArmTool, Push};
+    use nudge_core::arm::ArmTool;
     use nudge_core::episode::PushReport;
     use nudge_core::plan::{PlannerSettings, PolicyKind, Reason, Rule};
+    use nudge_core::skill::Push;
 
     #[test]
     fn the_page_of_a_push_shows_what_it_had_to_promise_and_lists_the_best_push_first() {
@@ -295,7 +315,7 @@ mod tests {
                 candidates: vec![weighed(500.0, 0.11), weighed(400.0, 0.12), weighed(600.0, 0.13)],
                 best_push: Some(1),
                 rule: Some(Rule { policy: PolicyKind::Mem, settings }),
-                ..Decision::unweighed(Action::Push(push(0.12)), Reason::PushTellsMore)
+                ..Decision::unweighed(Action::Manipulate(push(0.12).into()), Reason::PushTellsMore)
             };
             let setting = Setting {
                 shelf: &played.record.scene.shelf,
@@ -319,11 +339,31 @@ mod tests {
     }
 
     #[test]
+    fn every_skill_has_its_own_table_with_its_own_numbers() {
+        let mut decision = fixture::play(1).record.steps[0].decision.clone();
+        let candidate = |json: &str| CandidateRecord {
+            gain: Some(1.0),
+            ..CandidateRecord::of(serde_json::from_str::<Manipulation>(json).expect("a manipulation"))
+        };
+        decision.candidates = vec![
+            candidate(r#"{"kind": "push", "start": [0, 0.1, 0.06], "direction_deg": 90, "length_m": 0.1}"#),
+            candidate(
+                r#"{"kind": "drag", "start": [0, 0.2, 0.05], "direction_deg": -90, "length_m": 0.08, "pitch_deg": 45}"#,
+            ),
+        ];
+        let mut page = String::new();
+        SkillKind::ALL.iter().for_each(|kind| manipulations(&mut page, &decision, *kind));
+        assert!(page.contains("**Pushes**: 1 drawn") && page.contains("**Drags**: 1 drawn"), "{page}");
+        assert!(page.contains("| 0.00 | 0.20 | 0.05 | -90° | 80 mm | 45° |"), "{page}");
+        assert!(page.contains("| 0.00 | 0.10 | 0.06 | 90° | 100 mm | 0.0 s |"), "{page}");
+    }
+
+    #[test]
     fn a_blocked_push_tells_how_far_it_was_to_go() {
         let played = fixture::play(1);
         let push = Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.14 };
         let mut record = played.record.steps[0].clone();
-        record.action = Action::Push(push);
+        record.action = Action::Manipulate(push.into());
         record.push = Some(PushReport {
             pushed_m: 0.05,
             stalled: true,

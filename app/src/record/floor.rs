@@ -4,7 +4,7 @@ use super::paths;
 use super::shapes::segmentation;
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture::{self, FloorPlan, RgbImage};
-use nudge_core::belief::{Belief, MOST_SURPRISING, PushPrediction};
+use nudge_core::belief::{Belief, MOST_SURPRISING, Prediction};
 use nudge_core::camera::ViewArray;
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, Decision};
@@ -94,7 +94,7 @@ pub fn certainty(belief: &Belief) -> rerun::Image {
 }
 
 /// Classes after a push where it can reach, unknown elsewhere.
-pub fn predicted_classes(grid: &Grid, prediction: &PushPrediction) -> rerun::SegmentationImage {
+pub fn predicted_classes(grid: &Grid, prediction: &Prediction) -> rerun::SegmentationImage {
     let mut believed = vec![UNKNOWN; grid.cell_count()];
     for (at, cell) in prediction.window.cells(grid).enumerate() {
         let a = &prediction.semantics[at];
@@ -106,7 +106,7 @@ pub fn predicted_classes(grid: &Grid, prediction: &PushPrediction) -> rerun::Seg
 }
 
 /// Probability per cell that a push changes it (viridis).
-pub fn predicted_change(grid: &Grid, prediction: &PushPrediction) -> rerun::Image {
+pub fn predicted_change(grid: &Grid, prediction: &Prediction) -> rerun::Image {
     let mut change = vec![0.0; grid.cell_count()];
     for (at, cell) in prediction.window.cells(grid).enumerate() {
         change[cell] = prediction.change[at];
@@ -183,7 +183,7 @@ pub fn gain_map(array: &ViewArray, gains: &[f32], range: [f32; 2]) -> rerun::Ima
 pub fn chosen_views(array: &ViewArray, decision: &Decision) -> rerun::LineStrips2D {
     let looked = match decision.action {
         Action::Look { view } => Some(view),
-        Action::Push(_) => None,
+        Action::Manipulate(_) => None,
     };
     let ids = decision.pair.iter().copied().filter(|id| Some(*id) != looked).chain(looked);
     let shown: Vec<_> = ids.filter_map(|id| Some((id, array.views.get(usize::from(id.0))?))).collect();

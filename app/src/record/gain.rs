@@ -37,8 +37,8 @@ impl Gain {
 /// own measure under the prediction that changed the belief. `None` where the action promised nothing or was not weighed.
 pub fn of(setting: &Setting<'_>, gain: &plan::Gain, outcome: &StepOutcome) -> Option<Gain> {
     let record = &outcome.record;
-    let push = match record.action {
-        Action::Push(push) => push,
+    let done = match record.action {
+        Action::Manipulate(manipulation) => manipulation,
         Action::Look { view } => {
             let nats = gain.per_voxel(setting.views, view, RayDensity::FULL);
             return Gain::new(&format!("Gain of the look from view {}", view.0), nats);
@@ -47,9 +47,9 @@ pub fn of(setting: &Setting<'_>, gain: &plan::Gain, outcome: &StepOutcome) -> Op
     let prediction = outcome.prediction.as_ref()?;
     let offered: Vec<ViewId> = setting.views.views.iter().map(|view| view.id).collect();
     let offered: Vec<ViewId> = offered.into_iter().filter(|view| !setting.unreachable.contains(view)).collect();
-    let best = record.decision.candidates.iter().find(|candidate| candidate.push == push)?.view;
+    let best = record.decision.candidates.iter().find(|candidate| candidate.manipulation == done)?.view;
     let sources = gain.push_sources(setting.views, &offered, prediction, best)?;
     let stalled = record.push.as_ref().is_some_and(|report| report.stalled);
     let far = if stalled { format!(", as far as it went ({})", length(record)?) } else { String::new() };
-    Gain::new(&format!("Worth of the push{far}, {}", sources.words), sources.nats)
+    Gain::new(&format!("Worth of the {}{far}, {}", done.kind().name(), sources.words), sources.nats)
 }

@@ -29,21 +29,39 @@ pub fn standard(root: &str, plan: FloorPlan) -> Layout {
     let spaces = Part::Tabs(vec![
         space(
             "Belief",
-            &[paths::BELIEF_OCCUPANCY, objects, paths::CAMERA_VIEWS, paths::CAMERA_CURRENT, paths::PUSH_CHOSEN],
+            &[
+                paths::BELIEF_OCCUPANCY,
+                objects,
+                paths::CAMERA_VIEWS,
+                paths::CAMERA_CURRENT,
+                paths::PUSH_CHOSEN,
+                paths::PUSH_LINES,
+            ],
         ),
-        space("Classes", &[paths::BELIEF_CLASSES, objects, paths::CAMERA_CURRENT, paths::PUSH_CHOSEN]),
+        space(
+            "Classes",
+            &[paths::BELIEF_CLASSES, objects, paths::CAMERA_CURRENT, paths::PUSH_CHOSEN, paths::PUSH_LINES],
+        ),
         space("Undecided", &[paths::BELIEF_OPEN, paths::BELIEF_OCCUPANCY, paths::CAMERA_CURRENT]),
         space("Gain", &[paths::GAIN_VOXELS, paths::GAIN_LABEL, objects, paths::CAMERA_VIEWS, paths::CAMERA_CURRENT]),
         space(
             "Pushes",
-            &[paths::PUSH_CANDIDATES, paths::PUSH_CHOSEN, paths::PUSH_SWEPT, paths::BELIEF_OCCUPANCY, objects],
+            &[
+                paths::PUSH_CANDIDATES,
+                paths::PUSH_CHOSEN,
+                paths::PUSH_LINES,
+                paths::PUSH_SWEPT,
+                paths::BELIEF_OCCUPANCY,
+                objects,
+            ],
         ),
         Part::View(spatial("Robot", root, Eye::ROBOT, Ground::Dark, {
             let robot = [paths::CAMERA_REACH, paths::ROBOT_PATH, "robot/bodies/**", paths::CAMERA_CURRENT];
-            let shelf = [paths::SHELF, paths::SHELF_EDGES, paths::PUSH_CHOSEN, paths::PUSH_SWEPT, objects];
+            let shelf =
+                [paths::SHELF, paths::SHELF_EDGES, paths::PUSH_CHOSEN, paths::PUSH_LINES, paths::PUSH_SWEPT, objects];
             robot.iter().chain(&shelf).map(|path| at(path)).collect()
         })),
-        space("Predicted", &[paths::PREDICTED_OCCUPANCY, paths::PUSH_CHOSEN, objects]),
+        space("Predicted", &[paths::PREDICTED_OCCUPANCY, paths::PUSH_CHOSEN, paths::PUSH_LINES, objects]),
         space("Truth", &[paths::TRUTH_OCCUPANCY]),
         space("Error", &[paths::ERROR_OCCUPANCY, objects]),
     ]);

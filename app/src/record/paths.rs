@@ -48,10 +48,12 @@ pub const GAIN_CHOSEN: &str = "gain/views/chosen";
 pub const GAIN_VOXELS: &str = "gain/voxels";
 /// What gain that is, in words.
 pub const GAIN_LABEL: &str = "gain/voxels/label";
-/// The push candidates, by value; rejected ones grey.
+/// The candidates to move something, by value; rejected ones grey.
 pub const PUSH_CANDIDATES: &str = "push/candidates";
-/// The push of this step.
+/// The way of the tool in contact in this step.
 pub const PUSH_CHOSEN: &str = "push/chosen";
+/// How the tool stands at the beginning of it, where its skill tells.
+pub const PUSH_LINES: &str = "push/lines";
 /// What the tool swept.
 pub const PUSH_SWEPT: &str = "push/swept";
 /// The way of the arm's tip in this step.

@@ -1,10 +1,10 @@
 //! Bodies, cameras and pushes as meshes, lines, images and arrows.
 
 use crate::colors::{self, Colormap, Rgb};
-use nudge_core::arm::Push;
 use nudge_core::camera::{Frame, Intrinsics, Pinhole, View, ViewArray};
 use nudge_core::plan::Decision;
 use nudge_core::scene::{Body, Catalog, Shelf};
+use nudge_core::skill::{Arrow, Manipulation};
 use nudge_core::solid::ConvexPart;
 use nudge_core::{Point, Pose, Vector};
 
@@ -193,29 +193,39 @@ pub fn segmentation(labels: Vec<u8>, size: [u32; 2]) -> rerun::SegmentationImage
     rerun::SegmentationImage::new(labels, format)
 }
 
-/// The push candidates as arrows: feasible ones by value in the colours of the gain, rejected ones thin and grey.
+/// The candidates as arrows, one each: feasible ones by value in the colours of the gain, rejected ones thin and grey.
 pub fn candidates(decision: &Decision) -> rerun::Arrows3D {
     let values: Vec<Option<f32>> = decision.candidates.iter().map(|c| decision.value_of(c)).collect();
     let best = values.iter().flatten().copied().fold(f32::MIN_POSITIVE, f32::max);
     let worst = values.iter().flatten().copied().fold(best, f32::min);
-    let pushes = || decision.candidates.iter().map(|candidate| &candidate.push);
+    let arrows: Vec<Arrow> = decision.candidates.iter().map(|candidate| candidate.manipulation.arrow()).collect();
     let colors = values.iter().map(|value| match value {
         Some(value) => rerun::Color::from(Colormap::Cividis.of(*value, [worst, best])),
         None => rerun::Color::from(REJECTED_RGB),
     });
     let radii = values.iter().map(|value| if value.is_some() { 0.0022_f32 } else { 0.0008 });
-    rerun::Arrows3D::from_vectors(pushes().map(|push| vector(push.direction() * push.length_m)))
-        .with_origins(pushes().map(|push| push.start))
+    rerun::Arrows3D::from_vectors(arrows.iter().map(|arrow| vector(arrow.way)))
+        .with_origins(arrows.iter().map(|arrow| <[f32; 3]>::from(arrow.start.coords)))
         .with_colors(colors)
         .with_radii(radii)
 }
 
-/// The push that was carried out.
-pub fn chosen_push(push: &Push) -> rerun::Arrows3D {
-    rerun::Arrows3D::from_vectors([vector(push.direction() * push.length_m)])
-        .with_origins([push.start])
+/// The manipulation that was carried out: its ways in contact.
+pub fn chosen(manipulation: &Manipulation) -> rerun::Arrows3D {
+    let arrows = manipulation.outline().arrows;
+    rerun::Arrows3D::from_vectors(arrows.iter().map(|arrow| vector(arrow.way)))
+        .with_origins(arrows.iter().map(|arrow| <[f32; 3]>::from(arrow.start.coords)))
         .with_colors([rerun::Color::from(CHOSEN_RGB)])
         .with_radii([0.005_f32])
+}
+
+/// The lines beside the ways of the manipulation that was carried out.
+pub fn chosen_lines(manipulation: Option<&Manipulation>) -> rerun::LineStrips3D {
+    let lines = manipulation.map_or_else(Vec::new, |manipulation| manipulation.outline().lines);
+    let strip = |line: &Vec<Point>| line.iter().map(|point| <[f32; 3]>::from(point.coords)).collect::<Vec<_>>();
+    rerun::LineStrips3D::new(lines.iter().map(strip))
+        .with_colors([rerun::Color::from(CHOSEN_RGB)])
+        .with_radii([0.004_f32])
 }
 
 /// Words that hang at a place, metres; none for an empty text.

@@ -112,7 +112,7 @@ fn a_pushs_gain_is_drawn_as_its_own_worth_and_not_as_that_of_the_view_after_it()
     let played = fixture::play(4);
     let arm = ArmTool::standard(played.record.scene.shelf);
     let (outcome, before) = (&played.outcomes[3], &played.beliefs[3]);
-    let Action::Push(push) = outcome.record.action else { panic!("the fourth action is a push") };
+    let Action::Manipulate(push) = outcome.record.action else { panic!("the fourth action is a push") };
     let none = VoxelSet::empty(&before.grid);
     let counting = |counted| plan::Gain::new(counted, before, &none);
     let drawn = |counted| {
@@ -135,7 +135,7 @@ fn a_pushs_gain_is_drawn_as_its_own_worth_and_not_as_that_of_the_view_after_it()
     let sum: f32 = gain.nats.iter().map(|(_, nats)| nats).sum();
     assert!(opened > 0.0 && (sum - opened).abs() < 1e-2 * opened, "{sum} drawn, {opened} opened");
     assert!(gain.words.starts_with("Worth of the push, what it opens to all views together: "), "{}", gain.words);
-    let view = outcome.record.decision.candidates.iter().find(|candidate| candidate.push == push).expect("it");
+    let view = outcome.record.decision.candidates.iter().find(|candidate| candidate.manipulation == push).expect("it");
     let view = view.view.expect("a view").0;
     let gain = drawn(Counted::All);
     assert!(gain.words.contains(&format!("the best view after it, view {view}: ")), "{}", gain.words);

@@ -2,7 +2,7 @@
 
 use crate::colors::{self, Colormap, Rgb};
 use crate::picture;
-use nudge_core::belief::{Belief, PushPrediction, bernoulli_entropy, beta_mean};
+use nudge_core::belief::{Belief, Prediction, bernoulli_entropy, beta_mean};
 use nudge_core::grid::{Grid, Voxel, VoxelSet};
 use nudge_core::scene::{BACKGROUND, Catalog, ClassId};
 use nudge_core::world::TruthMap;
@@ -151,7 +151,7 @@ pub fn swept(grid: &Grid, swept: &VoxelSet) -> VoxelGridMap {
 }
 
 /// Voxels predicted occupied inside the push's window, by probability (viridis).
-pub fn predicted(grid: &Grid, prediction: &PushPrediction) -> VoxelGridMap {
+pub fn predicted(grid: &Grid, prediction: &Prediction) -> VoxelGridMap {
     let height = grid.dims[2];
     let mut probability = vec![0.0_f32; grid.voxel_count()];
     for (at, cell) in prediction.window.cells(grid).enumerate() {

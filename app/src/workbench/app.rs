@@ -22,10 +22,10 @@ use super::threads::Threads;
 use super::viewer::Viewer;
 use super::worker::{Event, Worker};
 use crate::planner_args::PlannerArgs;
-use nudge_core::arm::Push;
 use nudge_core::camera::{NoiseModel, ViewId};
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::Catalog;
+use nudge_core::skill::Manipulation;
 use re_viewer::external::{eframe, egui};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -212,7 +212,7 @@ pub struct App {
     /// The gain that was asked for last: the state and the view.
     asked_gain: Option<((SessionId, usize), ViewId)>,
     /// The prediction that was asked for last: the state and the push.
-    asked_preview: Option<((SessionId, usize), Push)>,
+    asked_preview: Option<((SessionId, usize), Manipulation)>,
     /// Where the parts of the window were drawn last, points.
     parts: Vec<(Part, egui::Rect)>,
     viewer: Option<Viewer>,

@@ -3,9 +3,9 @@
 use super::model::{LayoutKind, Picked};
 use super::session::SessionId;
 pub use super::toasts::Level;
-use nudge_core::arm::Push;
 use nudge_core::plan::{Action, Decision};
 use nudge_core::score::Verdict;
+use nudge_core::skill::Manipulation;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -50,7 +50,7 @@ pub enum Command {
     /// Starts an episode that shares the steps up to the cursor.
     Branch,
     /// Asks what a push would do to the belief at the cursor.
-    Preview(Push),
+    Preview(Manipulation),
     /// Asks where a view's gain under the belief at the cursor comes from.
     GainOf(nudge_core::camera::ViewId),
     /// Asks about a voxel or a floor cell.

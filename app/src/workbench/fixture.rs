@@ -4,13 +4,13 @@ use super::derive::Derived;
 use super::half_belief::HalfBelief;
 use super::model::{GainSource, Model, Preview};
 use super::session::{Activity, Moment, Session, SessionId, Setup};
-use nudge_core::belief::{BeliefUpdate, Classical, SweptPush};
+use nudge_core::belief::{BeliefUpdate, Classical};
 use nudge_core::camera::ViewId;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, StepOutcome};
 use nudge_core::gain::RayDensity;
 use nudge_core::plan::{Action, Decision, Gain, PlannerSettings, PolicyKind, Reason};
-use nudge_core::push::swept_by;
 use nudge_core::scene::{Catalog, GenerateConfig, Scene, Shelf, generate};
+use nudge_core::skill::intended;
 use nudge_core::world::TruthMap;
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
@@ -75,9 +75,9 @@ impl Script {
         let mut moments = vec![moment(&episode, None, &mut truth)];
         for step in 1..=self.steps {
             let mut decision = episode.decide();
-            let best = decision.best_push.and_then(|at| decision.candidates.get(at)).map(|best| best.push);
+            let best = decision.best_push.and_then(|at| decision.candidates.get(at)).map(|best| best.manipulation);
             if let Some(push) = best.filter(|_| step == self.push_at) {
-                (decision.action, decision.reason) = (Action::Push(push), Reason::Manual);
+                (decision.action, decision.reason) = (Action::Manipulate(push), Reason::Manual);
             } else if self.stray_at > 0 && step >= self.stray_at {
                 let view = ViewId((step * 7 % setup.views.views.len()) as u16);
                 (decision.action, decision.reason) = (Action::Look { view }, Reason::Manual);
@@ -164,13 +164,13 @@ pub fn answer(model: &mut Model) {
     let Some(session) = model.session() else { return };
     let step = model.cursor.min(session.steps());
     let belief = session.moment(step).belief.belief();
-    let push =
-        model.candidate.and_then(|at| session.decision_after(step)?.candidates.get(at)).map(|candidate| candidate.push);
-    let preview = push.map(|push| {
-        let swept = swept_by(&session.setup.arm, &belief, &push);
-        let pushes = [SweptPush { push, swept: swept.clone() }];
-        let prediction = session.setup.update.as_ref().expect("an update").predict_pushes(&belief, &pushes).remove(0);
-        Preview { of: (session.id, step), push, prediction: Arc::new(prediction), swept: Arc::new(swept) }
+    let candidate = model.candidate.and_then(|at| session.decision_after(step)?.candidates.get(at));
+    let preview = candidate.map(|candidate| {
+        let manipulation = candidate.manipulation;
+        let told = [intended(&session.setup.arm, &belief, &manipulation)];
+        let prediction = session.setup.update.as_ref().expect("an update").predict(&belief, &told).remove(0);
+        let [told] = told;
+        Preview { of: (session.id, step), manipulation, prediction: Arc::new(prediction), swept: Arc::new(told.swept) }
     });
     let source = model.view.map(|view| {
         let gain = Gain::new(session.record.config.planner.counted, &belief, &session.moment(step).seen);

@@ -8,10 +8,10 @@ pub use super::layout_kind::LayoutKind;
 use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
 use crate::driver::default_belief;
-use nudge_core::arm::Push;
-use nudge_core::belief::PushPrediction;
+use nudge_core::belief::Prediction;
 use nudge_core::camera::{NoiseModel, ViewId};
 use nudge_core::plan::{Counted, PlannerSettings, PolicyKind};
+use nudge_core::skill::Manipulation;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -103,8 +103,8 @@ pub enum Hovered {
     Nothing,
     /// A view.
     View(ViewId),
-    /// A push candidate.
-    Push(Push),
+    /// A candidate to move something.
+    Manipulation(Manipulation),
 }
 
 /// How far a person has moved the arm along its motion: of which step, and to which time, seconds.
@@ -178,15 +178,15 @@ impl StartForm {
     }
 }
 
-/// A belief update asked for, with the push that it is about.
+/// A belief update asked for, with the manipulation that it is about.
 #[derive(Clone, Debug)]
 pub struct Preview {
     /// The episode and the step whose belief it starts from.
     pub of: (SessionId, usize),
-    /// The push.
-    pub push: Push,
+    /// The manipulation.
+    pub manipulation: Manipulation,
     /// Belief and change that are predicted, with what is swept.
-    pub prediction: Arc<PushPrediction>,
+    pub prediction: Arc<Prediction>,
     /// The voxels that the tool sweeps.
     pub swept: Arc<nudge_core::grid::VoxelSet>,
 }

@@ -130,7 +130,7 @@ fn settle(harness: &mut Harness<'_, App>) -> Result<()> {
 fn choose(app: &mut App, step: Option<usize>, layout: LayoutKind) {
     let Some(session) = app.model.session() else { return };
     let before_push = session.moments.iter().rev().find_map(|moment| {
-        let pushed = matches!(moment.outcome.as_ref()?.record.action, Action::Push(_));
+        let pushed = matches!(moment.outcome.as_ref()?.record.action, Action::Manipulate(_));
         pushed.then(|| moment.step - 1)
     });
     // The last state of a finished episode has no decision to show; the one before it has.
@@ -153,7 +153,7 @@ fn most_telling(session: &Session) -> Option<usize> {
     for moment in &session.moments {
         let belief = moment.belief.belief();
         if let (Some(before), Some(outcome)) = (&before, &moment.outcome) {
-            let by = usize::from(matches!(outcome.record.action, Action::Push(_)));
+            let by = usize::from(matches!(outcome.record.action, Action::Manipulate(_)));
             let pairs = before.occupancy.iter().zip(&belief.occupancy);
             for (change, (a, b)) in changes.iter_mut().zip(pairs) {
                 change[by] = change[by].max((beta_mean(*a) - beta_mean(*b)).abs());

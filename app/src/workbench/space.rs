@@ -19,6 +19,7 @@ use crate::colors::{Colormap, Rgb};
 use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::colored;
+use nudge_core::Point;
 use nudge_core::belief::Belief;
 use nudge_core::camera::ViewId;
 use nudge_core::grid::Grid;
@@ -223,9 +224,17 @@ impl Painter {
         for entity in [at::BELIEF, at::PREDICTED, at::DIFFERENCE, at::HAPPENED, at::GAIN, at::OTHER, at::BETWEEN] {
             self.log_voxels(entity, &grid, Vec::new(), |_| [0; 3]);
         }
-        for entity in
-            [at::ARM_PATH, at::EDGES, at::VIEWS, at::CURRENT, at::HOVERED, at::PICKED, at::OBJECTS, at::OTHER_OBJECTS]
-        {
+        for entity in [
+            at::ARM_PATH,
+            at::LINES,
+            at::EDGES,
+            at::VIEWS,
+            at::CURRENT,
+            at::HOVERED,
+            at::PICKED,
+            at::OBJECTS,
+            at::OTHER_OBJECTS,
+        ] {
             self.log(entity, &rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()));
         }
         for entity in [at::CANDIDATES, at::CHOSEN] {
@@ -357,9 +366,11 @@ impl Painter {
         if self.differs(at::HOVERED, format!("{:?} {:?} {:?}", side.id, space.hovered, space.view)) {
             let strips = match space.hovered {
                 Hovered::View(view) => frustum(side, Some(view), 0.16, [255, 255, 255]),
-                Hovered::Push(push) => {
-                    let (from, to) = (push.start_point(), push.end_point());
-                    rerun::LineStrips3D::new([[<[f32; 3]>::from(from.coords), to.coords.into()]])
+                Hovered::Manipulation(manipulation) => {
+                    let outline = manipulation.outline();
+                    let ways = outline.arrows.iter().map(|arrow| vec![arrow.start, arrow.end()]);
+                    let strip = |line: Vec<Point>| line.iter().map(|p| <[f32; 3]>::from(p.coords)).collect::<Vec<_>>();
+                    rerun::LineStrips3D::new(ways.chain(outline.lines.iter().cloned()).map(strip))
                         .with_colors([rerun::Color::from([255, 255, 255])])
                         .with_radii([0.006_f32])
                 }

@@ -268,7 +268,7 @@ fn act(driver: &mut Driver, decision: Decision, latest: &mut Arc<Moment>, post: 
 
 /// The state of an episode and what led to it; what has not changed since `before` is shared with it.
 fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Moment>) -> Moment {
-    let pushed = outcome.as_ref().is_none_or(|outcome| matches!(outcome.record.action, Action::Push(_)));
+    let pushed = outcome.as_ref().is_none_or(|outcome| matches!(outcome.record.action, Action::Manipulate(_)));
     let shared = before.filter(|_| !pushed);
     Moment {
         step: episode.record().steps.len(),

@@ -5,9 +5,9 @@
 //! the arm looks, it stays outside of the shelf, whatever stands in it.
 
 use super::plan::{PlanSettings, plan, turned};
-use super::pusher::ArmTool;
 use super::segment::is_segment_free;
 use super::shortcut::shortcut;
+use super::tool::ArmTool;
 use super::{Hit, Joints, Motion, Space, frame_of};
 use crate::Pose;
 use crate::rng::{ChaCha8Rng, stream};

@@ -1,7 +1,7 @@
 //! Where in an empty shelf the level gripper can be.
 
-use super::pusher::ArmTool;
 use super::ready::level_tool;
+use super::tool::ArmTool;
 use nalgebra::Point3;
 use rayon::prelude::*;
 

@@ -15,6 +15,17 @@ pub fn level_tool(tip: &Point3<f64>, yaw_rad: f64) -> Frame {
     Frame::from_parts(Translation3::from(tip.coords), rotation)
 }
 
+/// The same, with the tool pointing downwards by `pitch_rad`; level for 0.
+pub fn inclined_tool(tip: &Point3<f64>, yaw_rad: f64, pitch_rad: f64) -> Frame {
+    let level = level_tool(tip, yaw_rad);
+    if pitch_rad == 0.0 {
+        return level;
+    }
+    // About the tool's own x, which points right: y is down and z ahead, so ahead turns down.
+    let pitch = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -pitch_rad);
+    Frame::from_parts(level.translation, level.rotation * pitch)
+}
+
 /// Where the tip enters the shelf before all pushes are tried: before the front edge, above the board, metres.
 const ENTRY_M: [f64; 2] = [0.10, 0.06];
 /// How deep it is tried to go in from there, metres.

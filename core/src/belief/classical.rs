@@ -9,9 +9,9 @@
 //!   (no negative evidence).
 //! * The Dirichlet of a floor cell is one plus the number of times each class was seen there.
 
-mod push;
+mod manipulated;
 
-use super::{Belief, BeliefUpdate, CLASSICAL, FloorPlan, PushPrediction, SOLID, SweptPush};
+use super::{Belief, BeliefUpdate, CLASSICAL, FloorPlan, Intervention, Prediction, SOLID};
 use crate::camera::MapObservation;
 use crate::scene::CLASS_COUNT;
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ pub const LOG_ODDS_STEP: f32 = 0.85;
 /// Largest magnitude of a voxel's log-odds (`p` between 0.029 and 0.971).
 pub const LOG_ODDS_LIMIT: f32 = 3.5;
 
-/// The classical update: log-odds and label counts for observations, a hand-made rule for pushes.
+/// The classical update: log-odds and label counts for observations, a hand-made rule for manipulations.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Classical;
 
@@ -54,9 +54,9 @@ impl BeliefUpdate for Classical {
         next
     }
 
-    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+    fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction> {
         let plan = FloorPlan::new(belief, SOLID);
-        pushes.par_iter().map(|push| push::predict(belief, &plan, push)).collect()
+        interventions.par_iter().map(|intervention| manipulated::predict(belief, &plan, intervention)).collect()
     }
 }
 

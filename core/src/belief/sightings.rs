@@ -5,7 +5,7 @@
 //! ([`LOOKS_TAKEN`]) change a column of the grid freely; after that a look changes it only near voxels that it sees for
 //! the first time ([`NEWS_REACH_M`]).
 
-use super::{Belief, BeliefUpdate, PushPrediction};
+use super::{Belief, BeliefUpdate, Prediction};
 use crate::camera::MapObservation;
 use crate::grid::{Grid, VoxelSet};
 
@@ -59,7 +59,7 @@ impl Sightings {
 
     /// After a push: columns that it has probably changed ([`CHANGED`]) count as unseen, and their number of looks
     /// starts at 0.
-    pub fn forget_changed(&mut self, prediction: &PushPrediction) {
+    pub fn forget_changed(&mut self, prediction: &Prediction) {
         let grid = self.grid;
         let cells = prediction.window.cells(&grid).zip(&prediction.change);
         for (cell, _) in cells.filter(|(_, chance)| **chance > CHANGED) {
@@ -133,7 +133,7 @@ pub fn look(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::belief::SweptPush;
+    use crate::belief::Intervention;
     use crate::grid::Window;
 
     /// Halves the evidence for occupancy everywhere, whatever it sees, as a network that was shown too much.
@@ -155,7 +155,7 @@ mod tests {
             next
         }
 
-        fn predict_pushes(&self, _: &Belief, _: &[SweptPush]) -> Vec<PushPrediction> {
+        fn predict(&self, _: &Belief, _: &[Intervention]) -> Vec<Prediction> {
             Vec::new()
         }
     }
@@ -226,7 +226,7 @@ mod tests {
             look(&Worn(true), &belief, &observed(&[], &all), &mut sightings);
         }
         assert!(look(&Worn(true), &belief, &observed(&[], &all), &mut sightings) == belief);
-        let mut prediction = PushPrediction {
+        let mut prediction = Prediction {
             window: Window::whole(&grid()),
             occupancy: belief.occupancy.clone(),
             semantics: belief.semantics.clone(),

@@ -7,8 +7,7 @@
 //!
 //! Evidence goes in as its logarithm, which squashes it and is 0 for the uniform prior.
 
-use crate::arm::Push;
-use crate::belief::{Belief, Carried};
+use crate::belief::{Belief, Moved, Stroke};
 use crate::camera::{MapObservation, UNOBSERVED};
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::CLASS_COUNT;
@@ -112,10 +111,10 @@ impl Layout {
         0..self.pixels[0]
     }
 
-    /// The window of at most `width` pixels along x around a push, in planes that are not mirrored.
-    pub(crate) fn around(&self, push: &Push, width: usize) -> Range<usize> {
+    /// The window of at most `width` pixels along x around a stroke, in planes that are not mirrored.
+    pub(crate) fn around(&self, stroke: &Stroke, width: usize) -> Range<usize> {
         let width = width.min(self.pixels[0]);
-        let middle = 0.5 * (push.start_point().x + push.end_point().x) - self.grid.origin[0];
+        let middle = 0.5 * (stroke.start.x + stroke.end().x) - self.grid.origin[0];
         let pixel = middle / (self.grid.voxel_m * FOLD as f32);
         let first = (pixel - 0.5 * width as f32).round().clamp(0.0, (self.pixels[0] - width) as f32) as usize;
         first..first + width
@@ -161,11 +160,11 @@ impl Layout {
         }
     }
 
-    /// Where a push starts and where it ends: two times [`SUBS`] planes, 1 within a centimetre (zero before).
-    pub(crate) fn put_marks(&self, push: &Push, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
+    /// Where a stroke starts and where it ends: two times [`SUBS`] planes, 1 within a centimetre (zero before).
+    pub(crate) fn put_marks(&self, stroke: &Stroke, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
         const REACH_M: f32 = 0.01;
         let plane = x.len() * self.pixels[1];
-        let ends = [push.start_point(), push.end_point()];
+        let ends = [stroke.start, stroke.end()];
         for (cell, sub, pixel) in self.cells(mirror, x) {
             let at = self.grid.cell_center(self.grid.cell(cell));
             for (which, end) in ends.iter().enumerate() {
@@ -176,26 +175,19 @@ impl Layout {
         }
     }
 
-    /// Where the object that a push moves stood, and where it comes to: two times [`SUBS`] planes (zero before).
-    pub(crate) fn put_carried(&self, carried: &Carried, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
+    /// Where what is moved stood, and where it comes to: two times [`SUBS`] planes (zero before).
+    pub(crate) fn put_moved(&self, moved: &Moved, mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
         let (stood, comes) = out.split_at_mut(SUBS * x.len() * self.pixels[1]);
-        self.put_cells(|cell| carried.stood(cell), mirror, x.clone(), stood);
-        self.put_cells(|cell| carried.source(cell).is_some(), mirror, x, comes);
+        self.put_cells(|cell| moved.stood(cell), mirror, x.clone(), stood);
+        self.put_cells(|cell| moved.source(cell).is_some(), mirror, x, comes);
     }
 
-    /// Channels of the (mirrored) whole `planes`, shifted with the moved object to where it comes to in the pixels `x`
+    /// Channels of the (mirrored) whole `planes`, shifted with what is moved to where it comes to in the pixels `x`
     /// (zero before).
-    pub(crate) fn put_arriving(
-        &self,
-        carried: &Carried,
-        planes: &[f32],
-        mirror: Mirror,
-        x: Range<usize>,
-        out: &mut [f32],
-    ) {
+    pub(crate) fn put_arriving(&self, moved: &Moved, planes: &[f32], mirror: Mirror, x: Range<usize>, out: &mut [f32]) {
         let (whole, plane) = (self.plane(), x.len() * self.pixels[1]);
         for (cell, sub, pixel) in self.cells(mirror, x) {
-            let Some(source) = carried.source(cell) else { continue };
+            let Some(source) = moved.source(cell) else { continue };
             let (from, at) = self.place(source, mirror);
             for channel in (0..planes.len() / whole).step_by(SUBS) {
                 out[(channel + sub) * plane + pixel] = planes[(channel + from) * whole + at];
@@ -291,7 +283,8 @@ impl Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::belief::{FloorPlan, SOLID, SweptPush};
+    use crate::belief::{FloorPlan, Flow, SOLID};
+    use crate::skill::push::{Push, SweptPush};
 
     fn grid() -> Grid {
         Grid::for_shelf([0.80, 0.40, 0.40], 0.005)
@@ -393,7 +386,7 @@ mod tests {
         let mut set = VoxelSet::empty(&grid());
         (0..grid().voxel_count()).filter(|index| index * 11 % 17 < 6).for_each(|index| set.insert(index));
         let push = Push { start: [0.12, 0.1, 0.06], direction_deg: 60.0, length_m: 0.1 };
-        let window = layout.around(&push, 40);
+        let window = layout.around(&push.stroke(), 40);
         assert_eq!(window.len(), 40);
         let [across, along] = layout.pixels();
         for (mirror, x) in [(Mirror::No, window.clone()), (Mirror::X, layout.mirrored(&window))] {
@@ -402,7 +395,7 @@ mod tests {
             let mut part = vec![0.0; OCCUPANCY * 40 * along];
             layout.put_set(&set, mirror, x.clone(), &mut part);
             let mut marks = vec![0.0; 2 * SUBS * 40 * along];
-            layout.put_marks(&push, mirror, x.clone(), &mut marks);
+            layout.put_marks(&push.stroke(), mirror, x.clone(), &mut marks);
             assert!(marks.iter().sum::<f32>() > 16.0, "both ends are in the window");
             for channel in 0..OCCUPANCY {
                 let from = channel * across * along + x.start * along;
@@ -435,7 +428,7 @@ mod tests {
     fn what_is_carried_along_arrives_whole_mirrored_or_not() {
         let layout = Layout::new(&grid()).expect("5 mm");
         let (belief, push) = push_of_a_box();
-        let carried = Carried::by(&push, &belief, &FloorPlan::new(&belief, SOLID)).expect("the tool meets the box");
+        let carried = push.intervention(&belief, &FloorPlan::new(&belief, SOLID)).flow.moved(&grid());
         let evidence = |belief: &Belief| {
             let plane = layout.plane();
             let (mut occupancy, mut semantics) = (vec![0.0; 2 * OCCUPANCY * plane], vec![0.0; SEMANTICS * plane]);
@@ -478,7 +471,7 @@ mod tests {
             assert!(tensor(&arriving(&turned, Mirror::X)).equal(&mirrored(&here)));
         }
         let mut marks = vec![0.0; 2 * SUBS * layout.plane()];
-        layout.put_carried(&carried, Mirror::No, layout.whole(), &mut marks);
+        layout.put_moved(&carried, Mirror::No, layout.whole(), &mut marks);
         let (stood, comes) = marks.split_at(SUBS * layout.plane());
         assert_eq!([stood, comes].map(|marks| marks.iter().sum::<f32>() as usize), [count; 2]);
     }
@@ -487,7 +480,8 @@ mod tests {
     fn a_push_through_air_carries_nothing_along() {
         let (belief, push) = push_of_a_box();
         let air = Belief { occupancy: vec![[1.0, 9.0]; grid().voxel_count()], ..belief };
-        assert!(Carried::by(&push, &air, &FloorPlan::new(&air, SOLID)).is_none());
+        let flow = push.intervention(&air, &FloorPlan::new(&air, SOLID)).flow;
+        assert!(flow == Flow::nothing() && flow.moved(&grid()).is_nothing());
     }
 
     #[test]

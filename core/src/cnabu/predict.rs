@@ -5,8 +5,8 @@ use super::layout::{LEVELS, Layout, Mirror, OCCUPANCY, SEMANTICS, SUBS, VOXELS_P
 use super::observe_net::{Evidence, LOG_EVIDENCE_LIMIT};
 use super::pool::Pool;
 use super::push_net::{Body, MARKS, Pixels, PriorParts, PushNet, PushPlanes, WINDOW};
-use crate::belief::{Belief, Carried, FloorPlan, PushPrediction, SOLID, SweptPush};
-use crate::grid::Window;
+use crate::belief::{Belief, Intervention, Moved, Prediction, Stroke};
+use crate::grid::{VoxelSet, Window};
 use crate::scene::CLASS_COUNT;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -17,10 +17,12 @@ const BATCH: usize = 8;
 /// Probability of change below which a floor cell keeps its belief as it is.
 const CHANGE_FLOOR: f32 = 0.05;
 
-/// A push, the object that it moves, and the pixels of its window.
+/// An intervention as the network sees it, in the pixels of its window: sigma_m was trained on pushes, of which it sees the
+/// swept volume, both ends of the stroke, and the object that moves, before and after.
 pub(crate) struct Windowed<'a> {
-    pub(crate) push: &'a SweptPush,
-    pub(crate) carried: Option<&'a Carried>,
+    pub(crate) swept: &'a VoxelSet,
+    pub(crate) stroke: &'a Stroke,
+    pub(crate) moved: &'a Moved,
     pub(crate) x: Range<usize>,
 }
 
@@ -54,47 +56,51 @@ pub(crate) fn push_planes(layout: &Layout, prior: &Numbers, pushes: &[Windowed<'
     };
     let arriving = |which: usize, channels: usize| {
         planes(channels, &|push, out| {
-            if let Some(carried) = push.carried {
-                layout.put_arriving(carried, &prior.0[which], mirror, push.x.clone(), out);
+            if !push.moved.is_nothing() {
+                layout.put_arriving(push.moved, &prior.0[which], mirror, push.x.clone(), out);
             }
         })
     };
     PushPlanes {
-        swept: planes(OCCUPANCY, &|push, out| layout.put_set(&push.push.swept, mirror, push.x.clone(), out)),
+        swept: planes(OCCUPANCY, &|push, out| layout.put_set(push.swept, mirror, push.x.clone(), out)),
         marks: planes(MARKS, &|push, out| {
             let (ends, carry) = out.split_at_mut(out.len() / 2);
-            layout.put_marks(&push.push.push, mirror, push.x.clone(), ends);
-            if let Some(carried) = push.carried {
-                layout.put_carried(carried, mirror, push.x.clone(), carry);
+            layout.put_marks(push.stroke, mirror, push.x.clone(), ends);
+            if !push.moved.is_nothing() {
+                layout.put_moved(push.moved, mirror, push.x.clone(), carry);
             }
         }),
         arriving: Evidence { occupancy: arriving(0, 2 * OCCUPANCY), semantics: arriving(1, SEMANTICS) },
     }
 }
 
-/// The predictions of sigma_m for pushes from one belief, whose evidence is `prior`; its log-odds of change are divided by
+/// The predictions of sigma_m for interventions in one belief, whose evidence is `prior`; its log-odds of change are divided by
 /// its temperature. `None` where there is no sigma_m.
 pub(super) fn predict(
     pool: &Pool,
     layout: &Layout,
     prior: &Evidence,
     belief: &Belief,
-    pushes: &[SweptPush],
-) -> Option<Vec<PushPrediction>> {
+    interventions: &[Intervention],
+) -> Option<Vec<Prediction>> {
     let (parts, temperature, device) = {
         let networks = pool.take();
         let (net, temperature) = networks.push.as_ref()?;
         (tch::no_grad(|| net.prior_parts(prior)), *temperature, networks.device())
     };
     let numbers = Numbers::of(prior);
-    let plan = FloorPlan::new(belief, SOLID);
-    let batches: Vec<_> = pushes.chunks(BATCH).map(|batch| (batch, parts.shared(), prior.shared())).collect();
-    let predict = |(batch, parts, prior): (&[SweptPush], PriorParts, Evidence)| {
-        let carried: Vec<_> = batch.par_iter().map(|push| Carried::by(push, belief, &plan)).collect();
+    let batches: Vec<_> = interventions.chunks(BATCH).map(|batch| (batch, parts.shared(), prior.shared())).collect();
+    let predict = |(batch, parts, prior): (&[Intervention], PriorParts, Evidence)| {
+        let moved: Vec<_> = batch.iter().map(|intervention| intervention.flow.moved(&belief.grid)).collect();
         let windowed: Vec<_> = batch
             .iter()
-            .zip(&carried)
-            .map(|(push, carried)| Windowed { push, carried: carried.as_ref(), x: layout.around(&push.push, WINDOW) })
+            .zip(&moved)
+            .map(|(Intervention { swept, stroke, .. }, moved)| Windowed {
+                swept,
+                stroke,
+                moved,
+                x: layout.around(stroke, WINDOW),
+            })
             .collect();
         let xs: Vec<Range<usize>> = windowed.iter().map(|push| push.x.clone()).collect();
         let planes = push_planes(layout, &numbers, &windowed, Mirror::No).to_device(device);
@@ -113,7 +119,7 @@ pub(super) fn predict(
         let each = changing.par_iter().zip(firsts).map(|(changing, first)| heads.prediction(changing, first, belief));
         Some(each.collect::<Vec<_>>())
     };
-    let predictions: Option<Vec<Vec<PushPrediction>>> = batches.into_par_iter().map(predict).collect();
+    let predictions: Option<Vec<Vec<Prediction>>> = batches.into_par_iter().map(predict).collect();
     predictions.map(|batches| batches.into_iter().flatten().collect())
 }
 
@@ -220,12 +226,12 @@ impl Heads {
     }
 
     /// The prediction of a push whose pixels begin at `first`; cut to where something may change.
-    fn prediction(&self, changing: &Changing<'_>, first: usize, belief: &Belief) -> PushPrediction {
+    fn prediction(&self, changing: &Changing<'_>, first: usize, belief: &Belief) -> Prediction {
         let grid = &belief.grid;
         let window = changing.tight();
         let mut order = vec![0_usize; changing.chance.len() / SUBS];
         changing.pixels.iter().enumerate().for_each(|(at, &pixel)| order[pixel] = first + at);
-        let mut prediction = PushPrediction {
+        let mut prediction = Prediction {
             window,
             occupancy: Vec::with_capacity(window.cell_count() * grid.dims[2]),
             semantics: Vec::with_capacity(window.cell_count()),

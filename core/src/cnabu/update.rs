@@ -14,7 +14,7 @@ use super::predict::predict;
 use super::push_net::PushNet;
 use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
-use crate::belief::{Belief, BeliefUpdate, Classical, NetworksUsed, PushPrediction, SweptPush, Weights};
+use crate::belief::{Belief, BeliefUpdate, Classical, Intervention, NetworksUsed, Prediction, Weights};
 use crate::camera::MapObservation;
 use crate::files::sha256_of_file;
 use crate::grid::Grid;
@@ -216,10 +216,10 @@ impl BeliefUpdate for Cnabu {
         belief_of(&layout, &evidence)
     }
 
-    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
-        let Ok(layout) = Layout::new(&belief.grid) else { return Classical.predict_pushes(belief, pushes) };
-        predict(&self.pool, &layout, &self.planes_of(&layout, belief), belief, pushes)
-            .unwrap_or_else(|| Classical.predict_pushes(belief, pushes))
+    fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction> {
+        let classical = || Classical.predict(belief, interventions);
+        let Ok(layout) = Layout::new(&belief.grid) else { return classical() };
+        predict(&self.pool, &layout, &self.planes_of(&layout, belief), belief, interventions).unwrap_or_else(classical)
     }
 }
 

@@ -1,10 +1,10 @@
 //! The simulated shelf: bodies that settle and are pushed, images by ray casting, and the truth.
 
 use super::Environment;
-use crate::arm::{Arm, ArmTool, PushMotion};
+use crate::arm::{Arm, ArmTool, PhasedMotion};
 use crate::camera::{Intrinsics, Sensed, View, render};
 use crate::scene::{Body, Catalog, Scene};
-use crate::world::{PushOutcome, Standing, TruthMap, World};
+use crate::world::{ManipulationOutcome, Standing, TruthMap, World};
 use crate::{Error, Result};
 use std::sync::{Arc, OnceLock};
 
@@ -24,7 +24,7 @@ pub struct Simulated {
 /// What was done to a shelf before it was resumed, and where that led.
 struct Resumed {
     arm: Arc<ArmTool>,
-    pushed: Vec<PushMotion>,
+    pushed: Vec<PhasedMotion>,
     standing: Vec<Standing>,
 }
 
@@ -90,7 +90,7 @@ impl Simulated {
     pub(crate) fn resumed(
         &self,
         arm: Arc<ArmTool>,
-        pushed: Vec<PushMotion>,
+        pushed: Vec<PhasedMotion>,
         standing: Vec<Standing>,
     ) -> std::result::Result<Self, String> {
         let bodies = self.start.bodies_at(&standing)?;
@@ -106,7 +106,7 @@ impl Environment for Simulated {
         Ok(self.frame_from(view, intrinsics))
     }
 
-    fn carry_out(&mut self, arm: &Arm, motion: &PushMotion) -> Result<PushOutcome> {
+    fn carry_out(&mut self, arm: &Arm, motion: &PhasedMotion) -> Result<ManipulationOutcome> {
         let stood = self.standing();
         if self.world().standing() != stood {
             let message = "simulating the pushes so far again does not lead to where the objects stood: the episode was made \

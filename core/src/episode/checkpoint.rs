@@ -86,7 +86,7 @@ impl Episode {
     /// In words, where the checkpoint cannot be of this log.
     pub(super) fn go_to(&mut self, checkpoint: Checkpoint, logged: EpisodeRecord) -> Result<(), String> {
         let shelf = self.simulated().ok_or("nothing is simulated")?;
-        let pushes = logged.steps.iter().filter(|step| matches!(step.action, Action::Push(_)));
+        let pushes = logged.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_)));
         let motions: Option<Vec<_>> = pushes.map(|step| step.decision.motion.clone()).collect();
         let motions = motions.ok_or("the log does not tell how the arm pushed")?;
         let shelf = shelf.resumed(self.arm().clone(), motions, checkpoint.standing)?;
@@ -97,7 +97,7 @@ impl Episode {
             history.record(&step.decision, !step.dropped().is_empty());
             let to = match step.action {
                 Action::Look { view } => self.hand_poses().get(usize::from(view.0)).cloned().flatten(),
-                Action::Push(_) => self.arm().ready.map(HandPose::waiting),
+                Action::Manipulate(_) => self.arm().ready.map(HandPose::waiting),
             };
             hand = if hand.is_some() { to.or(hand) } else { None };
         }

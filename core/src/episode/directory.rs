@@ -344,7 +344,7 @@ impl EpisodeDir {
         let path = self.told_path(step);
         Ok(match step.action {
             Action::Look { .. } => Told::Frame(told_file::read_frame(&path)?),
-            Action::Push(_) => Told::Push(told_file::read_push(&path, &self.grid()?)?),
+            Action::Manipulate(_) => Told::Manipulation(told_file::read_push(&path, &self.grid()?)?),
         })
     }
 
@@ -357,7 +357,7 @@ impl EpisodeDir {
     fn told_path(&self, step: &StepRecord) -> PathBuf {
         let extension = match step.action {
             Action::Look { .. } => "frame",
-            Action::Push(_) => "push",
+            Action::Manipulate(_) => "push",
         };
         self.numbered(FRAMES, step.index, extension)
     }

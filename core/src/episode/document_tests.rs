@@ -72,6 +72,27 @@ fn an_action_that_is_not_the_decision_s_is_refused() {
     assert_eq!(error, "e.json: steps[0].action: is not the action of its decision");
 }
 
+#[test]
+fn an_episode_with_a_skill_that_this_program_lacks_is_refused_in_one_line() {
+    let text = synthetic::record(2).to_json().replace(r#""kind": "push""#, r#""kind": "fly""#);
+    let error = EpisodeRecord::from_json(&text, Path::new("e.json")).expect_err("refuses").to_string();
+    assert!(error.starts_with("e.json: line "), "{error}");
+    assert!(error.ends_with("this program has no skill `fly`; it has push, drag") && !error.contains('\n'), "{error}");
+}
+
+#[test]
+fn candidates_of_before_there_were_other_skills_are_pushes() {
+    let mut document: Value = serde_json::from_str(&synthetic::record(2).to_json()).expect("JSON");
+    let written = synthetic::record(2);
+    for step in document["steps"].as_array_mut().expect("steps") {
+        for candidate in step["decision"]["candidates"].as_array_mut().expect("candidates") {
+            assert_eq!(candidate.as_object_mut().expect("an object").remove("kind"), Some("push".into()));
+        }
+    }
+    document["planner"].as_object_mut().expect("settings").remove("skills");
+    assert_eq!(EpisodeRecord::from_json(&document.to_string(), Path::new("e.json")).expect("reads"), written);
+}
+
 /// What is said of the document with one value in another's place.
 fn refusal(place: &str, value: Value) -> String {
     let mut document: Value = serde_json::from_str(&synthetic::record(2).to_json()).expect("JSON");
@@ -112,10 +133,10 @@ proptest! {
         record.config.planner.gamma = gamma;
         record.steps[0].decision.gains = gains.clone();
         record.steps[1].judgement.as_mut().expect("a truth").scores.entropy_nats = entropy;
-        let push = crate::arm::Push { start, direction_deg: gains[0], length_m };
-        record.steps[1].action = crate::plan::Action::Push(push);
+        let push = crate::skill::Push { start, direction_deg: gains[0], length_m };
+        record.steps[1].action = crate::plan::Action::Manipulate(push.into());
         record.steps[1].decision.action = record.steps[1].action;
-        record.steps[1].decision.candidates[0].push = push;
+        record.steps[1].decision.candidates[0].manipulation = push.into();
         let read = EpisodeRecord::from_json(&record.to_json(), Path::new("episode.json")).expect("reads");
         prop_assert_eq!(read.to_json(), record.to_json());
         let bits = |x: &[f32]| x.iter().map(|x| x.to_bits()).collect::<Vec<_>>();

@@ -21,8 +21,11 @@ impl Environment for Recording {
         Ok(Sensed { frame: frame.clone(), objects: None })
     }
 
-    fn carry_out(&mut self, _: &Arm, motion: &PushMotion) -> Result<PushOutcome> {
-        Ok(PushOutcome { passed: motion.way_in.path().chain(motion.push.path()).collect(), ..PushOutcome::default() })
+    fn carry_out(&mut self, _: &Arm, motion: &PhasedMotion) -> Result<ManipulationOutcome> {
+        Ok(ManipulationOutcome {
+            passed: motion.phases.iter().flat_map(|phase| phase.motion.path()).collect(),
+            ..ManipulationOutcome::default()
+        })
     }
 
     fn truth(&self) -> Option<&TruthMap> {
@@ -72,7 +75,7 @@ fn a_whole_episode_runs_is_filed_and_inferred_without_a_truth() {
         let path = root.path().join(name);
         let episode = run(&path, noise);
         let record = episode.record();
-        assert!(record.steps.iter().any(|step| matches!(step.action, Action::Push(_))), "it pushes too");
+        assert!(record.steps.iter().any(|step| matches!(step.action, Action::Manipulate(_))), "it pushes too");
         assert!(!record.has_truth() && record.steps.iter().all(|step| step.judgement.is_none()));
         assert!(record.entropy_after(7) < 0.8 * record.entropy_after(0), "and learns");
         assert!(episode.truth().is_none() && episode.bodies().is_empty() && episode.counterfactual().is_none());

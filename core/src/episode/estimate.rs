@@ -4,9 +4,10 @@
 
 use super::record::EpisodeRecord;
 use crate::Result;
-use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, SweptPush, look};
+use crate::belief::{Belief, BeliefUpdate, Prediction, Sightings, look};
 use crate::camera::{Frame, MapObservation, NoiseModel, Sensed, View};
 use crate::grid::Grid;
+use crate::skill::SweptManipulation;
 use std::sync::Arc;
 
 /// What a belief update was told: all that it takes to have the belief again.
@@ -14,8 +15,8 @@ use std::sync::Arc;
 pub enum Told {
     /// After a look what the environment gave, with the pose where the camera was thought to be; noise is not in its pixels.
     Frame(Sensed),
-    /// After a push as far as it came what the arm swept.
-    Push(SweptPush),
+    /// After a manipulation as far as it came what the arm swept.
+    Manipulation(SweptManipulation),
 }
 
 /// Belief and sightings. Cheap to clone.
@@ -38,15 +39,15 @@ impl Estimate {
         self.belief = Arc::new(look(update, &self.belief, observation, sightings));
     }
 
-    /// After a push that is predicted into the belief, or one after which the belief stays and everything is unseen.
-    pub(super) fn push(
+    /// After a manipulation that is predicted into the belief, or one after which the belief stays and everything is unseen.
+    pub(super) fn manipulate(
         &mut self,
         update: &dyn BeliefUpdate,
-        swept: &SweptPush,
+        swept: &SweptManipulation,
         is_predicted: bool,
-    ) -> Option<PushPrediction> {
-        let prediction =
-            is_predicted.then(|| update.predict_pushes(&self.belief, std::slice::from_ref(swept)).pop()).flatten();
+    ) -> Option<Prediction> {
+        let predict = || update.predict(&self.belief, &[swept.intervention(&self.belief)]).pop();
+        let prediction = is_predicted.then(predict).flatten();
         match &prediction {
             Some(prediction) => {
                 Arc::make_mut(&mut self.belief).apply(prediction);

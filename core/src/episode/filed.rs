@@ -4,12 +4,12 @@ use super::directory::EpisodeDir;
 use super::estimate::Told;
 use super::machine::Episode;
 use super::record::{StepOutcome, StepRecord};
-use crate::arm::{Arm, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, PushPrediction, SweptPush};
+use crate::arm::{Arm, PhasedMotion};
+use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction};
 use crate::camera::{Intrinsics, MapObservation, NoiseModel, Sensed, View, project};
 use crate::environment::Environment;
 use crate::scene::Catalog;
-use crate::world::{PushOutcome, TruthMap};
+use crate::world::{ManipulationOutcome, TruthMap};
 use crate::{Error, Result};
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ impl BeliefUpdate for Absent {
         belief.clone()
     }
 
-    fn predict_pushes(&self, _belief: &Belief, _pushes: &[SweptPush]) -> Vec<PushPrediction> {
+    fn predict(&self, _belief: &Belief, _interventions: &[Intervention]) -> Vec<Prediction> {
         Vec::new()
     }
 }
@@ -41,7 +41,7 @@ impl Environment for Gone {
         Err(Error::Usage("this episode's surroundings are not here: it can only be looked at".to_owned()))
     }
 
-    fn carry_out(&mut self, _: &Arm, _: &PushMotion) -> Result<PushOutcome> {
+    fn carry_out(&mut self, _: &Arm, _: &PhasedMotion) -> Result<ManipulationOutcome> {
         Err(Error::Usage("this episode's surroundings are not here: it can only be looked at".to_owned()))
     }
 
@@ -88,7 +88,7 @@ impl Episode {
             observation: None,
             swept: None,
             prediction: None,
-            push_outcome: None,
+            manipulated: None,
             motion: None,
         };
         let mut estimate = self.estimate().clone();
@@ -100,9 +100,9 @@ impl Episode {
                 estimate.look(self.update(), &observation);
                 (outcome.frame, outcome.observation) = (Some(frame), Some(observation));
             }
-            Some(Told::Push(swept)) => {
+            Some(Told::Manipulation(swept)) => {
                 let is_predicted = config.is_predicted(step.decision.reason);
-                outcome.prediction = estimate.push(self.update(), &swept, is_predicted);
+                outcome.prediction = estimate.manipulate(self.update(), &swept, is_predicted);
                 outcome.swept = Some(swept);
             }
             None => {}

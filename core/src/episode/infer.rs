@@ -52,7 +52,9 @@ fn move_on(
             let frame = noise.apply(&sensed, config.seed, index as u64);
             estimate.look(update, &project(&frame, &logged.scene.shelf));
         }
-        Told::Push(swept) => drop(estimate.push(update, &swept, config.is_predicted(step.decision.reason))),
+        Told::Manipulation(swept) => {
+            drop(estimate.manipulate(update, &swept, config.is_predicted(step.decision.reason)))
+        }
     }
     Ok(())
 }

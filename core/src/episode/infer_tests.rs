@@ -20,7 +20,7 @@ fn run(path: &Path, policy: PolicyKind) -> Episode {
         episode.act(episode.decide()).expect("an action");
         directory.write(&mut episode).expect("written");
     }
-    assert!(matches!(episode.record().steps[4].action, Action::Push(_)));
+    assert!(matches!(episode.record().steps[4].action, Action::Manipulate(_)));
     episode
 }
 

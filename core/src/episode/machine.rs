@@ -2,21 +2,19 @@
 
 use super::estimate::{Estimate, Told, sense};
 use super::judgement::{Judgement, Prior, entropy_nats};
-use super::record::{
-    EpisodeConfig, EpisodeRecord, FORMAT, LinkTouch, PushReport, StepOutcome, StepRecord, StepSeconds,
-};
+use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, PushReport, StepOutcome, StepRecord, StepSeconds};
 use super::stopwatch::Stopwatch;
-use crate::arm::{Arm, ArmTool, HandPose, Motion, Push, PushMotion};
-use crate::belief::{Belief, BeliefUpdate, SweptPush};
+use crate::arm::{Arm, ArmTool, HandPose, Motion, PhasedMotion};
+use crate::belief::{Belief, BeliefUpdate};
 use crate::camera::{Frame, MapObservation, Sensed, View, ViewArray, ViewId, project};
 use crate::environment::{Environment, Simulated};
 use crate::grid::{Grid, VoxelSet};
 use crate::made_by::{Build, MadeBy};
 use crate::plan::{self, Action, Decision, History, Situation};
-use crate::push::{ArmClearance, Candidate, Counterfactual};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
-use crate::world::{PushOutcome, TruthMap};
+use crate::skill::{ArmClearance, Candidate, Counterfactual, Ground, Manipulation};
+use crate::world::{ManipulationOutcome, TruthMap};
 use crate::{Error, Result};
 use std::sync::Arc;
 use std::time::Instant;
@@ -157,7 +155,7 @@ impl Episode {
             }
             (*after.belief).clone()
         };
-        let really_push = |motions: &[PushMotion]| {
+        let really_push = |motions: &[PhasedMotion]| {
             self.counterfactual().map_or_else(Vec::new, |known| known.of_each(motions, &|| ()))
         };
         let situation = Situation {
@@ -183,8 +181,8 @@ impl Episode {
     /// [`Episode::decide`] before.
     ///
     /// # Errors
-    /// [`Error::Usage`] past the budget, for a view that the array does not have, for a push that is no finite motion or
-    /// that the arm cannot carry out, and for a push after an object was dropped. The episode is then as it was.
+    /// [`Error::Usage`] past the budget, for a view that the array does not have, for a manipulation that is no finite motion
+    /// or that the arm cannot carry out, and for one after an object was dropped. The episode is then as it was.
     pub fn act(&mut self, mut decision: Decision) -> Result<StepOutcome> {
         if self.is_finished() {
             return Err(Error::Usage(format!("the budget of {} actions is used up", self.record.config.budget)));
@@ -194,7 +192,7 @@ impl Episode {
         let action = decision.action;
         match action {
             Action::Look { view } => self.look(decision, view, seconds),
-            Action::Push(push) => self.push(decision, push, seconds),
+            Action::Manipulate(manipulation) => self.manipulate(decision, manipulation, seconds),
         }
     }
 
@@ -220,38 +218,46 @@ impl Episode {
             observation: Some(observation),
             swept: None,
             prediction: None,
-            push_outcome: None,
+            manipulated: None,
             motion,
         })
     }
 
-    fn push(&mut self, mut decision: Decision, push: Push, mut seconds: StepSeconds) -> Result<StepOutcome> {
+    fn manipulate(
+        &mut self,
+        mut decision: Decision,
+        manipulation: Manipulation,
+        mut seconds: StepSeconds,
+    ) -> Result<StepOutcome> {
+        let name = manipulation.kind().name();
         if self.history.dropped {
-            return Err(Error::Usage("an object was dropped: this episode pushes no more".to_owned()));
+            return Err(Error::Usage(format!(
+                "an object was dropped: this episode {} no more",
+                manipulation.kind().plural()
+            )));
         }
-        let numbers = [push.start[0], push.start[1], push.start[2], push.direction_deg, push.length_m];
-        if !numbers.iter().all(|number| number.is_finite()) || push.length_m < 0.0 {
-            return Err(Error::Usage(format!("a push must be a finite motion, not {numbers:?}")));
+        if !manipulation.skill().is_finite() {
+            return Err(Error::Usage(format!("a {name} must be a finite motion, not {manipulation:?}")));
         }
         let started = Instant::now();
         let arm = self.arm.clone();
-        let motion = self.motion_for(&arm, &mut decision, &push)?;
+        let motion = self.motion_for(&arm, &mut decision, &manipulation)?;
         let outcome = self.environment.carry_out(&arm.arm, &motion)?;
         let to_wait = self.carry(arm.ready.map(HandPose::waiting)).unwrap_or_default();
         seconds.act = started.elapsed().as_secs_f64();
 
         let started = Instant::now();
         // The arm knows how far it came: what it did not sweep is not believed to be free.
-        let swept = SweptPush::done(&push, &outcome, &arm.arm, &self.grid());
+        let swept = manipulation.done(&outcome, &arm.arm, &self.grid());
         let is_predicted = self.record.config.is_predicted(decision.reason);
-        let prediction = self.estimate.push(&*self.update, &swept, is_predicted);
-        self.told = Some(Told::Push(swept.clone()));
+        let prediction = self.estimate.manipulate(&*self.update, &swept, is_predicted);
+        self.told = Some(Told::Manipulation(swept.clone()));
         self.filed_truth = None;
         let happened = Happened {
             dropped: outcome.dropped.clone(),
             displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
             motion_s: to_wait.duration_s() + f64::from(outcome.arm_s),
-            push: Some(self.report(&outcome)),
+            push: Some(PushReport::of(&outcome, |id| self.name(id))),
         };
         let record = self.file(decision, happened, started, seconds);
         Ok(StepOutcome {
@@ -260,25 +266,28 @@ impl Episode {
             observation: None,
             swept: Some(swept),
             prediction,
-            push_outcome: Some(outcome),
+            manipulated: Some(outcome),
             motion: Some(to_wait.then(&motion.whole(&arm.arm))),
         })
     }
 
-    /// The arm's motion for a push: the decision's if it is for this push, else a new one, which the decision then keeps.
-    fn motion_for(&self, arm: &ArmTool, decision: &mut Decision, push: &Push) -> Result<PushMotion> {
+    /// The arm's motion for a manipulation: the decision's if it is for this one, else a new one, which the decision then
+    /// keeps.
+    fn motion_for(&self, arm: &ArmTool, decision: &mut Decision, wanted: &Manipulation) -> Result<PhasedMotion> {
+        let skill = wanted.skill();
         let kept = decision
             .motion
             .take()
-            .filter(|motion| arm.ready.is_some_and(|ready| motion.carries_out(&arm.arm, &ready, push)));
+            .filter(|motion| arm.ready.is_some_and(|ready| skill.is_done_by(motion, &arm.arm, &ready)));
         let motion = match kept {
             Some(motion) => motion,
             None => {
                 let clearance = ArmClearance::new(arm, &self.estimate.belief);
                 let mut rng = stream(self.record.config.seed, "push by hand", self.record.steps.len() as u64);
-                clearance
-                    .motion(push, &clearance.target_of(push), &mut rng)
-                    .map_err(|reason| Error::Usage(format!("the arm cannot carry this push out: {reason}")))?
+                skill.plan(&clearance, &mut rng).map_err(|reason| {
+                    let (name, reason) = (wanted.kind().name(), wanted.against(&reason));
+                    Error::Usage(format!("the arm cannot carry this {name} out: {reason}"))
+                })?
             }
         };
         decision.motion = Some(motion.clone());
@@ -292,20 +301,6 @@ impl Episode {
         let motion = self.arm.carry(from, &to, &mut rng);
         self.hand = Some(to);
         Some(motion)
-    }
-
-    fn report(&self, outcome: &PushOutcome) -> PushReport {
-        let touch = |contact: &crate::world::LinkContact| LinkTouch {
-            link: contact.link.clone(),
-            object: self.name(contact.object),
-        };
-        PushReport {
-            pushed_m: outcome.pushed_m,
-            stalled: outcome.stalled,
-            contacts: outcome.link_contacts.iter().map(touch).collect(),
-            against_wall: outcome.against_wall.iter().map(|id| self.name(*id)).collect(),
-            arm_in_shelf_m: outcome.arm_in_shelf_m,
-        }
     }
 
     /// `class#id`.
@@ -449,11 +444,13 @@ impl Episode {
         Some(Counterfactual::new(world, &self.arm, &self.views, self.estimate.sightings.seen()))
     }
 
-    /// The push candidates that a decision to be made now draws, whatever the policy makes of them.
-    pub fn draw_pushes(&self) -> Vec<Candidate> {
+    /// The candidates that a decision to be made now draws, whatever the policy makes of them.
+    pub fn draw_candidates(&self) -> Vec<Candidate> {
         let config = &self.record.config;
         let actions = self.history.actions.len();
-        plan::draw_pushes(&config.planner, self.belief(), self.seen(), &self.arm, config.seed, actions)
+        let (seen, sampler) = (config.planner.counted.left_out(self.seen()), config.planner.push_sampler);
+        let ground = Ground { belief: self.belief(), seen, arm: &self.arm, sampler };
+        plan::draw_candidates(&config.planner, &ground, config.seed, actions)
     }
 
     /// How the belief changes.

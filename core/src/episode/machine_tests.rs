@@ -4,6 +4,7 @@ use crate::belief::CHANGED;
 use crate::camera::NoiseModel;
 use crate::plan::{Counted, PlannerSettings, PolicyKind, Reason};
 use crate::score::{Scores, Verdict};
+use crate::skill::Push;
 
 /// What a step is but for its seconds.
 fn timeless(step: &StepRecord) -> StepRecord {
@@ -25,7 +26,7 @@ fn looking_tells_what_is_there() {
     while !episode.is_finished() {
         let outcome = episode.act(episode.decide()).expect("an action");
         assert!(outcome.frame.is_some() && outcome.observation.is_some());
-        assert!(outcome.swept.is_none() && outcome.prediction.is_none() && outcome.push_outcome.is_none());
+        assert!(outcome.swept.is_none() && outcome.prediction.is_none() && outcome.manipulated.is_none());
         assert_eq!(&outcome.record, episode.record().steps.last().expect("a step"));
         let scores = Scores::of(episode.belief(), episode.truth().expect("a truth"));
         assert_eq!((outcome.record.scores(), outcome.record.entropy_nats), (Some(&scores), scores.entropy_nats));
@@ -49,7 +50,7 @@ fn a_push_moves_objects_and_is_predicted_into_the_belief() {
         episode.act(manual(Action::Look { view: ViewId(view) })).expect("a look");
     }
     let (belief, truth) = (episode.belief().clone(), episode.truth().cloned());
-    let outcome = episode.act(manual(Action::Push(HEAD_ON))).expect("a push");
+    let outcome = episode.act(manual(Action::Manipulate(HEAD_ON.into()))).expect("a push");
     assert!(outcome.record.displacement_m().is_some_and(|m| m > 0.01), "{:?}", outcome.record.displacement_m());
     assert!(outcome.record.dropped().is_empty());
     assert_ne!(episode.truth().cloned(), truth);
@@ -75,7 +76,7 @@ fn what_looks_have_seen_counts_no_more_until_a_push_changes_it() {
     let again = decided(&episode, 145);
     assert!(again < 0.05 * first, "{again} of {first}");
 
-    let outcome = episode.act(manual(Action::Push(HEAD_ON))).expect("a push");
+    let outcome = episode.act(manual(Action::Manipulate(HEAD_ON.into()))).expect("a push");
     let (grid, prediction) = (episode.grid(), outcome.prediction.expect("a person's push is predicted"));
     let now = episode.seen();
     let changed = prediction.window.cells(&grid).zip(&prediction.change).filter(|(_, chance)| **chance > CHANGED);
@@ -98,7 +99,7 @@ fn all_voxels_count_as_they_are_and_a_blind_push_makes_everything_unseen() {
 
     let mut blind = counting_unseen(PolicyKind::RandomPush5Blind, 6);
     blind.act(manual(Action::Look { view: ViewId(145) })).expect("a look");
-    let unpredicted = Decision { reason: Reason::Schedule, ..manual(Action::Push(HEAD_ON)) };
+    let unpredicted = Decision { reason: Reason::Schedule, ..manual(Action::Manipulate(HEAD_ON.into())) };
     blind.act(unpredicted).expect("a push");
     assert!(blind.seen().is_empty());
 }
@@ -115,7 +116,7 @@ fn a_blind_policy_leaves_the_belief_as_it_is_after_its_push() {
     let mut episode = synthetic::episode(PolicyKind::RandomPush5Blind, 4);
     episode.act(manual(Action::Look { view: ViewId(45) })).expect("a look");
     let (belief, truth) = (episode.belief().clone(), episode.truth().cloned());
-    let decision = Decision { reason: Reason::Schedule, ..manual(Action::Push(HEAD_ON)) };
+    let decision = Decision { reason: Reason::Schedule, ..manual(Action::Manipulate(HEAD_ON.into())) };
     let outcome = episode.act(decision).expect("a push");
     assert!(outcome.prediction.is_none());
     assert!(*episode.belief() == belief && episode.truth().cloned() != truth);
@@ -129,7 +130,7 @@ fn deciding_changes_nothing_and_a_branch_goes_its_own_way() {
     assert_eq!(decision, episode.decide());
     let before = (episode.record().clone(), episode.belief().clone(), episode.truth().cloned());
     let mut branch = episode.branch().expect("a simulated shelf branches");
-    let push = branch.act(manual(Action::Push(HEAD_ON))).expect("a push");
+    let push = branch.act(manual(Action::Manipulate(HEAD_ON.into()))).expect("a push");
     assert!(push.record.displacement_m() > Some(0.0));
     assert!(before == (episode.record().clone(), episode.belief().clone(), episode.truth().cloned()));
     assert_eq!(decision, episode.decide());
@@ -138,15 +139,15 @@ fn deciding_changes_nothing_and_a_branch_goes_its_own_way() {
     assert_eq!(timeless(&one.record), timeless(&other.record));
     assert!(episode.belief() == twin.belief());
     // The same push after the same look leads to the same truth.
-    let again = episode.act(manual(Action::Push(HEAD_ON))).expect("a push");
-    assert_eq!(again.push_outcome, push.push_outcome);
+    let again = episode.act(manual(Action::Manipulate(HEAD_ON.into()))).expect("a push");
+    assert_eq!(again.manipulated, push.manipulated);
 }
 
 #[test]
 fn what_cannot_be_done_is_refused_and_changes_nothing() {
     let mut episode = synthetic::episode_with(synthetic::config(PolicyKind::Random, 1));
     let before = episode.record().clone();
-    let push = |push: Push| manual(Action::Push(push));
+    let push = |push: Push| manual(Action::Manipulate(push.into()));
     let refused = [
         (manual(Action::Look { view: ViewId(300) }), "view 300 of 300 in standard300"),
         (push(Push { length_m: f32::NAN, ..HEAD_ON }), "a push must be a finite motion"),
@@ -176,7 +177,7 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
 }
 
 /// The arm's motion for a push with the gripper turned away from where it pulls to: in from the left, around a can.
-fn hook(episode: &Episode, push: &Push) -> PushMotion {
+fn hook(episode: &Episode, push: &Push) -> PhasedMotion {
     let tool = episode.arm();
     let (arm, ready) = (&tool.arm, tool.ready.expect("a place to wait"));
     let tip = push.start_point().map(f64::from);
@@ -187,7 +188,7 @@ fn hook(episode: &Episode, push: &Push) -> PushMotion {
         let along = crate::arm::follow_line(arm, &start, &travel, |_| true);
         let out = crate::arm::follow_line(arm, &start, &aside, |_| true);
         let way_in: Vec<_> = std::iter::once(ready).chain(out.path.iter().rev().copied()).collect();
-        (along.complete && out.complete).then(|| PushMotion::new(arm, &way_in, &along.path))
+        (along.complete && out.complete).then(|| PhasedMotion::new(arm, &way_in, &along.path))
     });
     ways.min_by(|a, b| a.duration_s(arm).total_cmp(&b.duration_s(arm))).expect("a way around")
 }
@@ -201,7 +202,7 @@ fn a_drop_is_recorded_and_ends_the_pushing() {
     let catalog = Arc::new(Catalog::standard());
     let mut episode = Episode::new(scene, catalog, config, Arc::new(crate::belief::Classical)).expect("an episode");
     let push = Push { start: [0.02, 0.09, 0.06], direction_deg: -80.0, length_m: 0.15 };
-    let mut hooked = manual(Action::Push(push));
+    let mut hooked = manual(Action::Manipulate(push.into()));
     hooked.motion = Some(hook(&episode, &push));
     let outcome = episode.act(hooked).expect("a push");
     assert_eq!(outcome.record.dropped(), ["tomato_can#0"]);
@@ -210,7 +211,7 @@ fn a_drop_is_recorded_and_ends_the_pushing() {
             && episode.truth().expect("a truth").occupancy.iter().all(|occupied| *occupied == 0)
     );
     assert!(episode.history().dropped && outcome.record.objects().is_empty());
-    let error = episode.act(manual(Action::Push(push))).expect_err("refused").to_string();
+    let error = episode.act(manual(Action::Manipulate(push.into()))).expect_err("refused").to_string();
     assert_eq!(error, "an object was dropped: this episode pushes no more");
     while !episode.is_finished() {
         let decision = episode.decide();
@@ -247,7 +248,7 @@ fn an_episode_does_not_depend_on_the_number_of_threads() {
         })
     };
     let (one, three) = (run(1), run(3));
-    assert!(matches!(one.0[4].action, Action::Push(_)), "{:?}", one.0[4].decision.reason);
+    assert!(matches!(one.0[4].action, Action::Manipulate(_)), "{:?}", one.0[4].decision.reason);
     assert_eq!(one.0, three.0);
     assert!(one.1 == three.1 && one.2 == three.2);
 }

@@ -2,13 +2,14 @@
 
 use super::judgement::{Judgement, Prior, RawJudgement};
 use crate::arm::Motion;
-use crate::belief::{BeliefUpdate, PushPrediction, SweptPush};
+use crate::belief::{BeliefUpdate, Prediction};
 use crate::camera::{Frame, MapObservation, NoiseModel};
 use crate::made_by::MadeBy;
 use crate::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, Rule};
-use crate::scene::Scene;
+use crate::scene::{ObjectId, Scene};
 use crate::score::{ObjectVerdict, Scores};
-use crate::world::PushOutcome;
+use crate::skill::SweptManipulation;
+use crate::world::{LinkContact, ManipulationOutcome};
 use serde::{Deserialize, Serialize};
 
 /// The format number of `episode.json`. In format 1, which is still read, every episode had a truth, and `entropy_nats`
@@ -85,7 +86,7 @@ pub struct StepRecord {
     pub judgement: Option<Judgement>,
     /// How long the robot moved in this step, seconds of its own time; 0 where no arm could be there.
     pub motion_s: f64,
-    /// What the arm met, after a push.
+    /// What the arm met, after a manipulation of whatever skill.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub push: Option<PushReport>,
     /// Where the time went.
@@ -145,12 +146,12 @@ impl TryFrom<RawStep> for StepRecord {
     }
 }
 
-/// What became of a push by the arm.
+/// What became of a manipulation by the arm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PushReport {
-    /// How far the tip really moved along the push, metres.
+    /// How far the tip really moved in contact, metres.
     pub pushed_m: f32,
-    /// Whether the arm was blocked and gave up before the push's end.
+    /// Whether the arm was blocked and gave up before the contact's end.
     pub stalled: bool,
     /// Links (not the gripper) that touched an object, each with the object as `class#id`.
     pub contacts: Vec<LinkTouch>,
@@ -158,6 +159,20 @@ pub struct PushReport {
     pub against_wall: Vec<String>,
     /// How deep the arm got into a panel of the shelf at most, metres.
     pub arm_in_shelf_m: f32,
+}
+
+impl PushReport {
+    /// Of an outcome; `name` gives an object as `class#id`.
+    pub(super) fn of(outcome: &ManipulationOutcome, name: impl Fn(ObjectId) -> String) -> Self {
+        let touch = |contact: &LinkContact| LinkTouch { link: contact.link.clone(), object: name(contact.object) };
+        Self {
+            pushed_m: outcome.way_m,
+            stalled: outcome.stalled,
+            contacts: outcome.link_contacts.iter().map(touch).collect(),
+            against_wall: outcome.against_wall.iter().map(|id| name(*id)).collect(),
+            arm_in_shelf_m: outcome.arm_in_shelf_m,
+        }
+    }
 }
 
 /// A link that touched an object.
@@ -242,7 +257,8 @@ impl EpisodeRecord {
 
     /// The numbers of actions after which a truth is filed: 0 and every push; none where the truth is not known.
     pub fn truth_indices(&self) -> impl Iterator<Item = usize> + '_ {
-        let pushes = self.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).map(|step| step.index);
+        let pushes =
+            self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index);
         std::iter::once(0).chain(pushes).filter(|_| self.has_truth())
     }
 
@@ -261,12 +277,12 @@ pub struct StepOutcome {
     pub frame: Option<Frame>,
     /// The frame projected into the grid, after a look.
     pub observation: Option<MapObservation>,
-    /// The push with its swept volume, after a push.
-    pub swept: Option<SweptPush>,
-    /// The belief that was predicted for the push, after a push that was predicted.
-    pub prediction: Option<PushPrediction>,
-    /// What the push did.
-    pub push_outcome: Option<PushOutcome>,
-    /// How the arm moved as it was planned: to the view, or to the push, along it and back.
+    /// The manipulation as far as it came, with what it swept, after one.
+    pub swept: Option<SweptManipulation>,
+    /// The belief that was predicted, after a manipulation that was predicted.
+    pub prediction: Option<Prediction>,
+    /// What the manipulation did.
+    pub manipulated: Option<ManipulationOutcome>,
+    /// How the arm moved as it was planned: to the view, or to the contact, along it and back.
     pub motion: Option<Motion>,
 }

@@ -3,7 +3,7 @@ use super::super::synthetic;
 use super::super::{Overwrite, Precision};
 use super::super::{resume, review};
 use super::*;
-use crate::belief::{Belief, Classical, NetworksUsed, PushPrediction, SweptPush, Weights};
+use crate::belief::{Belief, Classical, Intervention, NetworksUsed, Prediction, Weights};
 use crate::camera::MapObservation;
 use crate::made_by::Build;
 use crate::plan::{Action, PolicyKind};
@@ -58,7 +58,7 @@ fn an_episode_resumes_and_replays_to_the_bit() {
     let root = tempdir().expect("a temporary directory");
     let (whole, stopped) = (root.path().join("whole"), root.path().join("stopped"));
     let first = run(&whole, BUDGET);
-    assert!(matches!(first.record().steps[4].action, Action::Push(_)), "{:?}", first.record().steps[4]);
+    assert!(matches!(first.record().steps[4].action, Action::Manipulate(_)), "{:?}", first.record().steps[4]);
 
     for steps in [0, 3, 5] {
         drop(run(&stopped, steps));
@@ -239,8 +239,8 @@ impl BeliefUpdate for Weighted {
         Classical.observe(belief, observation)
     }
 
-    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
-        Classical.predict_pushes(belief, pushes)
+    fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction> {
+        Classical.predict(belief, interventions)
     }
 }
 

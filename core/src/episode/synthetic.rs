@@ -4,15 +4,14 @@
 use super::judgement::Judgement;
 use super::machine::Episode;
 use super::record::{EpisodeConfig, EpisodeRecord, FORMAT, StepRecord, StepSeconds};
-use crate::arm::Push;
 use crate::belief::{Belief, Classical};
 use crate::camera::ViewId;
 use crate::made_by::{Build, MadeBy};
 use crate::plan::{Action, CandidateRecord, Decision, PlannerSettings, PolicyKind, Reason, Rule};
-use crate::push::{Rejection, Stage};
 use crate::rng;
 use crate::scene::{BACKGROUND, CLASS_COUNT, Catalog, Object, Scene, Shelf};
 use crate::score::{ObjectVerdict, Scores, Verdict};
+use crate::skill::{Push, Rejection, Stage};
 use crate::world::TruthMap;
 use rand::Rng;
 use std::sync::Arc;
@@ -44,7 +43,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
     let step = |index: usize| {
         let mut rng = rng::stream(3, "synthetic", index as u64);
         let push = Push { start: [0.01, 0.02, 0.06], direction_deg: 87.3, length_m: 0.1 };
-        let action = if index == 2 { Action::Push(push) } else { Action::Look { view: ViewId(17) } };
+        let action = if index == 2 { Action::Manipulate(push.into()) } else { Action::Look { view: ViewId(17) } };
         let gains: Vec<f32> = (0..300).map(|_| rng.random_range(0.0..5000.0)).collect();
         let weighed = CandidateRecord {
             gain: Some(gains[0]),

@@ -1,14 +1,13 @@
-//! Files of what belief updates were told: `frames/NNN.frame` after a look, `frames/NNN.push` after a push.
+//! Files of what belief updates were told: `frames/NNN.frame` after a look, `frames/NNN.push` after a manipulation.
 //!
-//! A push is filed as the voxels that the arm swept, one bit each and compressed (Zstandard), behind a first line of JSON with
-//! the push as far as it came. Frames are [`Sensed::to_bytes`].
+//! A manipulation is filed as the voxels that the arm swept, one bit each and compressed (Zstandard), behind a first line of JSON with
+//! the manipulation as far as it came. Frames are [`Sensed::to_bytes`].
 
 use super::estimate::Told;
-use crate::arm::Push;
-use crate::belief::SweptPush;
 use crate::camera::Sensed;
 use crate::files::{split_head, with_head};
 use crate::grid::{Grid, VoxelSet};
+use crate::skill::{Manipulation, SweptManipulation};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -21,7 +20,9 @@ const LEVEL: i32 = 9;
 #[derive(Serialize, Deserialize)]
 struct Head {
     format: u32,
-    push: Push,
+    /// Of before there were other skills it has no `kind`, and is a push.
+    #[serde(rename = "push")]
+    manipulation: Manipulation,
 }
 
 impl Told {
@@ -29,7 +30,7 @@ impl Told {
     pub(super) fn extension(&self) -> &'static str {
         match self {
             Self::Frame(_) => "frame",
-            Self::Push(_) => "push",
+            Self::Manipulation(_) => "push",
         }
     }
 
@@ -37,14 +38,14 @@ impl Told {
     pub(super) fn to_bytes(&self) -> Vec<u8> {
         match self {
             Self::Frame(sensed) => sensed.to_bytes(),
-            Self::Push(swept) => push_bytes(swept),
+            Self::Manipulation(swept) => push_bytes(swept),
         }
     }
 }
 
-fn push_bytes(swept: &SweptPush) -> Vec<u8> {
+fn push_bytes(swept: &SweptManipulation) -> Vec<u8> {
     let words: Vec<u8> = swept.swept.words().iter().flat_map(|word| word.to_le_bytes()).collect();
-    with_head(&Head { format: FORMAT, push: swept.push }, &words, LEVEL)
+    with_head(&Head { format: FORMAT, manipulation: swept.manipulation }, &words, LEVEL)
 }
 
 /// The voxel set of bytes, which are not compressed.
@@ -59,7 +60,7 @@ pub(super) fn read_frame(path: &Path) -> Result<Sensed> {
 }
 
 /// Reads a filed push over a grid.
-pub(super) fn read_push(path: &Path, grid: &Grid) -> Result<SweptPush> {
+pub(super) fn read_push(path: &Path, grid: &Grid) -> Result<SweptManipulation> {
     let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
     let fail = |place: &str, words: &str| Error::input(path, place, words);
     let (head, content) = split_head(&bytes).ok_or_else(|| fail("", "is no push"))?;
@@ -70,5 +71,5 @@ pub(super) fn read_push(path: &Path, grid: &Grid) -> Result<SweptPush> {
     let words = zstd::bulk::decompress(content, 8 * grid.voxel_count().div_ceil(64))
         .map_err(|error| fail("", &format!("is cut short or damaged ({error})")))?;
     let swept = voxel_set(grid, &words).ok_or_else(|| fail("", "sweeps another grid than the scene's"))?;
-    Ok(SweptPush { push: head.push, swept })
+    Ok(SweptManipulation { manipulation: head.manipulation, swept })
 }

@@ -3,7 +3,7 @@
 use super::code::{MATTER, OPAQUE, Quantiser};
 use super::layout::{Layout, VoxelBox};
 use super::{RayDensity, arrivals, skip};
-use crate::belief::{Belief, PushPrediction, beta_mean};
+use crate::belief::{Belief, Prediction, beta_mean};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::{Grid, VoxelSet, Window};
 use crate::world::TruthMap;
@@ -67,7 +67,7 @@ impl GainField {
 
     /// This field with a push's predicted window in place of what stands there. Voxels that were seen do not count
     /// after the push either: looking at them again would only restore what the push made uncertain.
-    pub fn with_prediction(&self, prediction: &PushPrediction) -> Self {
+    pub fn with_prediction(&self, prediction: &Prediction) -> Self {
         self.patched(prediction).0
     }
 
@@ -122,7 +122,7 @@ impl GainField {
     }
 
     /// Writes a prediction over a [flat](Self::flat) field.
-    pub(super) fn overwrite(&mut self, prediction: &PushPrediction) {
+    pub(super) fn overwrite(&mut self, prediction: &Prediction) {
         let quantiser = Quantiser::get();
         let height = self.layout.grid.dims[2];
         let predicted = prediction.occupancy.chunks_exact(height);
@@ -144,7 +144,7 @@ impl GainField {
     }
 
     /// This field with a prediction, and the box of the voxels that changed in it.
-    pub(super) fn patched(&self, prediction: &PushPrediction) -> (Self, Option<VoxelBox>) {
+    pub(super) fn patched(&self, prediction: &Prediction) -> (Self, Option<VoxelBox>) {
         let mut field = self.clone();
         let window = prediction.window;
         let height = self.layout.grid.dims[2];

@@ -15,7 +15,7 @@ use super::code::{LIKELIEST, Matter};
 use super::field::GainField;
 use super::ray::{Camera, Ray, Tally};
 use super::skip::is_transparent;
-use crate::belief::PushPrediction;
+use crate::belief::Prediction;
 use crate::camera::{ViewArray, ViewId};
 use rayon::prelude::*;
 
@@ -73,14 +73,14 @@ impl Openings {
     }
 
     /// What each of some pushes opens, nats.
-    pub fn under_each(&self, predictions: &[PushPrediction]) -> Vec<f32> {
+    pub fn under_each(&self, predictions: &[Prediction]) -> Vec<f32> {
         let scratch = || (self.field.clone(), Opened::beyond(&self.open));
         let of = |(field, opened): &mut (GainField, Opened<'_>), prediction| self.under(prediction, field, opened);
         predictions.par_iter().with_min_len(MIN_TOGETHER).map_init(scratch, of).collect()
     }
 
     /// Where what a push opens comes from: voxel positions and their nats, in ascending order of position.
-    pub fn per_voxel(&self, prediction: &PushPrediction) -> Vec<(usize, f32)> {
+    pub fn per_voxel(&self, prediction: &Prediction) -> Vec<(usize, f32)> {
         let (mut field, mut opened) = (self.field.clone(), Opened::beyond(&self.open));
         field.overwrite(prediction);
         self.walk(&field, &mut opened);
@@ -94,7 +94,7 @@ impl Openings {
     }
 
     /// What a push opens; `field` is a copy of the own one, and is that again afterwards.
-    fn under(&self, prediction: &PushPrediction, field: &mut GainField, opened: &mut Opened<'_>) -> f32 {
+    fn under(&self, prediction: &Prediction, field: &mut GainField, opened: &mut Opened<'_>) -> f32 {
         field.overwrite(prediction);
         self.walk(field, opened);
         field.restore(&self.field, prediction.window);
@@ -201,9 +201,9 @@ mod tests {
 
     /// A row of voxels of 0.1 m into the shelf, a camera that looks straight into it, and the prediction of other
     /// probabilities for it.
-    fn row(before: &[f32], after: &[f32]) -> (Belief, ViewArray, PushPrediction) {
+    fn row(before: &[f32], after: &[f32]) -> (Belief, ViewArray, Prediction) {
         let grid = Grid::for_shelf([0.1, 0.1 * before.len() as f32, 0.1], 0.1);
-        let prediction = PushPrediction {
+        let prediction = Prediction {
             window: Window::whole(&grid),
             occupancy: after.iter().map(|p| [*p, 1.0 - p]).collect(),
             semantics: vec![[1.0; CLASS_COUNT]; after.len()],
@@ -267,7 +267,7 @@ mod tests {
         for seed in 0..12 {
             let (belief, other) = (patchy(grid, seed), patchy(grid, 100 + seed));
             let window = Window { x: [6, 24], y: [2, 15] };
-            let prediction = PushPrediction {
+            let prediction = Prediction {
                 window,
                 occupancy: window.cells(&grid).flat_map(|cell| other.occupancy[grid.column(cell)].to_vec()).collect(),
                 semantics: vec![[1.0; CLASS_COUNT]; window.cell_count()],

@@ -4,7 +4,7 @@ use super::field::GainField;
 use super::layout::VoxelBox;
 use super::ray::{Camera, Ray, Tally};
 use super::{RayDensity, fixed, nats, ray_gain};
-use crate::belief::PushPrediction;
+use crate::belief::Prediction;
 use crate::camera::{ViewArray, ViewId};
 use rayon::prelude::*;
 
@@ -57,7 +57,7 @@ impl RayGains {
     }
 
     /// Gain of every view under the field [with a prediction](GainField::with_prediction).
-    pub fn under(&self, prediction: &PushPrediction) -> Vec<f32> {
+    pub fn under(&self, prediction: &Prediction) -> Vec<f32> {
         let (field, changed) = self.field.patched(prediction);
         let Some(VoxelBox { min, max }) = changed else { return self.gains() };
         let changed = Reached { min: min.map(|at| at as u16), max: max.map(|at| at as u16) };

@@ -4,7 +4,7 @@ mod change;
 pub(super) mod support;
 
 use super::*;
-use crate::belief::{Belief, PushPrediction, bernoulli_entropy};
+use crate::belief::{Belief, Prediction, bernoulli_entropy};
 use crate::grid::{VoxelSet, Window};
 use crate::scene::CLASS_COUNT;
 use proptest::prelude::*;
@@ -54,7 +54,7 @@ fn what_a_push_blurs_of_what_was_seen_is_no_gain_but_blocks() {
     let (belief, array) = row(&[0.01, 0.5]);
     let mut seen = VoxelSet::empty(&belief.grid);
     seen.insert(0);
-    let prediction = PushPrediction {
+    let prediction = Prediction {
         window: Window { x: [0, 1], y: [0, 1] },
         occupancy: vec![[1.0, 1.0]],
         semantics: vec![[1.0; CLASS_COUNT]],

@@ -2,7 +2,7 @@
 
 use super::{Dataset, MapSample, PushSample, PushedSample, VIEWS, VIEWS_AFTER, ViewSample};
 use crate::Result;
-use crate::belief::{Belief, BeliefUpdate, PushPrediction, Sightings, look};
+use crate::belief::{Belief, BeliefUpdate, Prediction, Sightings, look};
 use crate::grid::{Grid, VoxelSet};
 use crate::score::Tally;
 use crate::world::TruthMap;
@@ -74,13 +74,13 @@ fn for_each_push(
     observe: &dyn BeliefUpdate,
     predict: &dyn BeliefUpdate,
     progress: &mut dyn FnMut(usize),
-    each: &mut dyn FnMut(&PushSample, &Belief, &PushedSample, &PushPrediction),
+    each: &mut dyn FnMut(&PushSample, &Belief, &PushedSample, &Prediction),
 ) -> Result<()> {
     for at in 0..data.len() {
         let sample = data.get(at)?;
         let (belief, _) = after_views(observe, &data.grid(), &sample.views);
-        let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
-        for (pushed, prediction) in sample.pushes.iter().zip(predict.predict_pushes(&belief, &pushes)) {
+        let interventions = sample.interventions(&belief);
+        for (pushed, prediction) in sample.pushes.iter().zip(predict.predict(&belief, &interventions)) {
             each(&sample, &belief, pushed, &prediction);
         }
         progress(at + 1);
@@ -160,7 +160,7 @@ pub fn evaluate_after_pushes(
         let Some(pushed) = sample.pushes.first() else { continue };
         let truth = truth_map(&grid, &pushed.truth, &pushed.labels);
         let (mut belief, mut sightings) = after_views(update, &grid, &sample.views);
-        for prediction in update.predict_pushes(&belief, std::slice::from_ref(&pushed.push)) {
+        for prediction in update.predict(&belief, &sample.interventions(&belief)[..1]) {
             belief.apply(&prediction);
             sightings.forget_changed(&prediction);
         }

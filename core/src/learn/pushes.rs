@@ -16,11 +16,11 @@ use super::maps::{occupied, put_views, take_views};
 use super::{Kind, Recipe, Record, Sample, VIEWS, ViewSample};
 use crate::Result;
 use crate::arm::ArmTool;
-use crate::arm::Push;
-use crate::belief::{Belief, BeliefUpdate, Classical, SweptPush};
+use crate::belief::{Belief, BeliefUpdate, Classical, FloorPlan, Intervention, SOLID};
 use crate::grid::{Grid, VoxelSet};
-use crate::push::{self, Candidate, PushSampler};
 use crate::rng::{derived_seed, stream};
+use crate::skill::push::{Push, PushSampler, SweptPush, sample};
+use crate::skill::{Candidate, Manipulation, SweptManipulation};
 use crate::world::{TruthMap, World};
 use rand::Rng;
 
@@ -66,6 +66,12 @@ pub struct PushSample {
 }
 
 impl PushSample {
+    /// What a belief update is told of the pushes, in a belief.
+    pub fn interventions(&self, belief: &Belief) -> Vec<Intervention> {
+        let solid = FloorPlan::new(belief, SOLID);
+        self.pushes.iter().map(|pushed| pushed.push.intervention(belief, &solid)).collect()
+    }
+
     /// Per floor cell whether a push of this sample changes anything: a voxel of its column, or its label.
     pub fn changed_by(&self, pushed: &PushedSample) -> Vec<bool> {
         let height = self.truth.voxel_count() / self.labels.len();
@@ -91,7 +97,7 @@ impl PushSample {
         let belief =
             views.iter().fold(Belief::uniform(grid), |belief, view| Classical.observe(&belief, &view.observation));
         let mut rng = stream(scene_seed, "sample pushes", 0);
-        let candidates = push::sample(PushSampler::Frontier, &belief, None, &recipe.arm, PUSHES, &mut rng);
+        let candidates = sample(PushSampler::Frontier, &belief, None, &recipe.arm, PUSHES, &mut rng);
         let (mut pushes, mut after) = (Vec::new(), Vec::new());
         for candidate in candidates.into_iter().filter(|candidate| candidate.rejection.is_none()) {
             let mut world = world.clone();
@@ -115,8 +121,15 @@ fn carry_out(world: &mut World, arm: &ArmTool, candidate: Candidate, as_done: bo
     if !outcome.dropped.is_empty() {
         return None;
     }
-    let done = as_done && outcome.stalled;
-    Some(if done { SweptPush::done(&candidate.swept.push, &outcome, &arm.arm, grid) } else { candidate.swept })
+    let SweptManipulation { manipulation, swept } = if as_done && outcome.stalled {
+        candidate.manipulation.done(&outcome, &arm.arm, grid)
+    } else {
+        SweptManipulation { manipulation: candidate.manipulation, swept: candidate.swept }
+    };
+    match manipulation {
+        Manipulation::Push(push) => Some(SweptPush { push, swept }),
+        _ => None,
+    }
 }
 
 /// Appends zeros.

@@ -15,8 +15,8 @@
 //!
 //! # Pushes and labels
 //!
-//! Three of four pushes are drawn from the frontier ([`PushSampler::Frontier`](crate::push::PushSampler)), the rest before what
-//! is hidden; all are feasible under the belief. Labels are those of [`PushTruth`](crate::push::PushTruth): objects won and lost
+//! Three of four pushes are drawn from the frontier ([`PushSampler::Frontier`](crate::skill::PushSampler)), the rest before what
+//! is hidden; all are feasible under the belief. Labels are those of [`PushTruth`](crate::skill::PushTruth): objects won and lost
 //! (25 pixels in some view), voxels of each object that views reach, space opened, how far the tip came, whether it jammed,
 //! drops. Beside them stands what was promised: the nats that sigma_m's prediction opens, its disturbance, and the prediction itself.
 //!

@@ -58,7 +58,7 @@ impl Decision {
     /// What the schedule of the policy says, which is not the planner's rule.
     fn by_schedule(&self) -> String {
         let Rule { policy, settings } = self.ruled_by();
-        let pushes = matches!(self.action, Action::Push(_));
+        let pushes = matches!(self.action, Action::Manipulate(_));
         match policy {
             PolicyKind::Mem | PolicyKind::ClairvoyantPush => "the policy's schedule says so".to_owned(),
             PolicyKind::MemNoPush => "it is the best view, and the policy never pushes".to_owned(),
@@ -88,13 +88,14 @@ impl Decision {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::Push;
     use crate::camera::ViewId;
     use crate::plan::PlannerSettings;
+    use crate::skill::{Manipulation, Push};
     use std::collections::BTreeSet;
 
     const LOOK: Action = Action::Look { view: ViewId(0) };
-    const PUSH: Action = Action::Push(Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 });
+    const PUSH: Action =
+        Action::Manipulate(Manipulation::Push(Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 }));
 
     fn said(policy: PolicyKind, action: Action, reason: Reason) -> String {
         let settings = PlannerSettings { closing_steps: 4, ..PlannerSettings::default() };

@@ -123,7 +123,7 @@ impl Decision {
         let rule = self.ruled_by();
         let winner = match self.action {
             Action::Look { .. } => Winner::Look,
-            Action::Push(_) => Winner::Push,
+            Action::Manipulate(_) => Winner::Push,
         };
         let by_rule = matches!(self.reason, Reason::LookTellsMore | Reason::PushTellsLittle | Reason::PushTellsMore);
         let mut terms = Vec::new();
@@ -179,8 +179,10 @@ impl Decision {
     pub fn promised(&self) -> Option<f32> {
         match self.action {
             Action::Look { view } => self.gains.get(usize::from(view.0)).copied(),
-            Action::Push(_) if self.pushed() == self.best_candidate() => self.compares_a_push().then_some(self.igm),
-            Action::Push(_) => self.pushed().and_then(|at| self.candidates[at].gain),
+            Action::Manipulate(_) if self.pushed() == self.best_candidate() => {
+                self.compares_a_push().then_some(self.igm)
+            }
+            Action::Manipulate(_) => self.pushed().and_then(|at| self.candidates[at].gain),
         }
     }
 
@@ -188,7 +190,7 @@ impl Decision {
     pub fn pushed(&self) -> Option<usize> {
         match self.action {
             Action::Look { .. } => None,
-            Action::Push(push) => self.candidates.iter().position(|candidate| candidate.push == push),
+            Action::Manipulate(done) => self.candidates.iter().position(|candidate| candidate.manipulation == done),
         }
     }
 
@@ -222,8 +224,7 @@ pub fn ranked(best: Option<usize>, gains: impl Iterator<Item = Option<f32>>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::Push;
-    use crate::push::Rejection;
+    use crate::skill::{Push, Rejection};
 
     fn push(length_m: f32) -> Push {
         Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m }
@@ -243,7 +244,7 @@ mod tests {
     fn weighed(patience: f32, push_floor: f32, reason: Reason) -> Decision {
         let settings = PlannerSettings { patience, push_floor, ..PlannerSettings::default() };
         let action = match reason {
-            Reason::PushTellsMore => Action::Push(push(0.01)),
+            Reason::PushTellsMore => Action::Manipulate(push(0.01).into()),
             _ => Action::Look { view: crate::camera::ViewId(0) },
         };
         Decision {
@@ -294,7 +295,7 @@ mod tests {
     #[test]
     fn a_push_drawn_at_random_is_not_compared_and_promises_nothing() {
         let mut decision = weighed(1.0, 0.0, Reason::Schedule);
-        decision.action = Action::Push(push(0.01));
+        decision.action = Action::Manipulate(push(0.01).into());
         assert_eq!(decision.promised(), Some(400.0));
         (decision.candidates[0].gain, decision.candidates[0].reg, decision.igm) = (None, None, 0.0);
         let comparison = decision.comparison();

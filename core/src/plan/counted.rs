@@ -30,7 +30,7 @@ impl Counted {
     }
 
     /// The voxels that do not count, of those that looks have seen; `None` where all count.
-    pub(super) fn left_out(self, seen: &VoxelSet) -> Option<&VoxelSet> {
+    pub(crate) fn left_out(self, seen: &VoxelSet) -> Option<&VoxelSet> {
         match self {
             Self::All => None,
             Self::Unseen => Some(seen),

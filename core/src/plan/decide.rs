@@ -5,8 +5,8 @@ use super::weigh::{Weighed, random_push, weigh_clairvoyantly, weigh_pushes};
 use super::{Action, Counted, Decision, Gain, PlannerSettings, PolicyKind, Reason, Rule, Situation};
 use crate::belief::Belief;
 use crate::camera::ViewId;
-use crate::push::PushTruth;
 use crate::rng::stream;
+use crate::skill::PushTruth;
 use rand::Rng;
 use rayon::prelude::*;
 
@@ -54,14 +54,14 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
                 decision.action = random_look(situation);
             }
             if (step + 1).is_multiple_of(PUSH_EVERY) {
-                push_at_random(&mut decision, situation, guard());
+                push_at_random(&mut decision, situation, settings, guard());
             }
         }
         PolicyKind::Saturation => {
             let previous = history.best_gains.last().copied();
             let current = decision.best_gain().unwrap_or(0.0);
             if previous.is_some_and(|previous| saturated(previous, current, settings.saturation)) {
-                push_at_random(&mut decision, situation, guard());
+                push_at_random(&mut decision, situation, settings, guard());
             }
         }
         PolicyKind::Oracle => decision.action = clairvoyant_look(situation),
@@ -76,7 +76,7 @@ fn choose(decision: &mut Decision, weighed: Weighed, settings: &PlannerSettings)
     decision.reg = best.reg.unwrap_or(0.0);
     decision.reason = ruled(decision, settings);
     if decision.reason == Reason::PushTellsMore {
-        decision.action = Action::Push(best.push);
+        decision.action = Action::Manipulate(best.manipulation);
     }
 }
 
@@ -93,7 +93,7 @@ fn choose_clairvoyantly(
     decision.igm = if truth.balance() < 0 { 0.0 } else { truth.opened_nats(belief) };
     decision.reason = if truth.balance() > 0 { Reason::PushReveals } else { ruled(decision, settings) };
     if matches!(decision.reason, Reason::PushReveals | Reason::PushTellsMore) {
-        decision.action = Action::Push(decision.candidates[at].push);
+        decision.action = Action::Manipulate(decision.candidates[at].manipulation);
     }
 }
 
@@ -115,13 +115,18 @@ fn ruled(decision: &Decision, settings: &PlannerSettings) -> Reason {
 }
 
 /// Replaces the look by a random feasible push, if nothing forbids it and there is one.
-fn push_at_random(decision: &mut Decision, situation: &Situation<'_>, guard: Option<Reason>) {
+fn push_at_random(
+    decision: &mut Decision,
+    situation: &Situation<'_>,
+    settings: &PlannerSettings,
+    guard: Option<Reason>,
+) {
     if let Some(reason) = guard {
         decision.reason = reason;
         return;
     }
-    if let Some(at) = take_over(decision, random_push(situation)) {
-        decision.action = Action::Push(decision.candidates[at].push);
+    if let Some(at) = take_over(decision, random_push(situation, settings.skills)) {
+        decision.action = Action::Manipulate(decision.candidates[at].manipulation);
     }
 }
 

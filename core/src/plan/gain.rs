@@ -10,7 +10,7 @@
 //! comes from above, where the camera sees most past the objects in front.
 
 use super::Counted;
-use crate::belief::{Belief, PushPrediction};
+use crate::belief::{Belief, Prediction};
 use crate::camera::{ViewArray, ViewId};
 use crate::gain::{Coverage, GainField, RayDensity, ViewPair, best_pair, gain_of_views, gain_per_voxel, gain_together};
 use crate::grid::VoxelSet;
@@ -89,7 +89,7 @@ impl Gain {
     }
 
     /// Gains after a push, under its prediction. Voxels that were seen before it do not count after it either.
-    pub(super) fn after(&self, prediction: &PushPrediction) -> Self {
+    pub(super) fn after(&self, prediction: &Prediction) -> Self {
         Self(match &self.0 {
             By::Rays(field) => By::Rays(field.with_prediction(prediction)),
             By::Coverage(field) => By::Coverage(field.with_prediction(prediction)),

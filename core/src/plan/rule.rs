@@ -46,12 +46,13 @@ pub fn saturated(previous: f32, current: f32, share: f32) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::Push;
     use crate::camera::ViewId;
     use crate::plan::{Action, Counted};
+    use crate::skill::{Manipulation, Push};
 
     const LOOK: Action = Action::Look { view: ViewId(0) };
-    const PUSH: Action = Action::Push(Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 });
+    const PUSH: Action =
+        Action::Manipulate(Manipulation::Push(Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 }));
 
     fn after(actions: &[Action]) -> History {
         History { actions: actions.to_vec(), ..History::default() }

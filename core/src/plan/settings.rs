@@ -5,7 +5,7 @@
 
 use super::Counted;
 use crate::belief::{CERTAIN, CLASSICAL, CNABU, COMPLETE_SHARE};
-use crate::push::PushSampler;
+use crate::skill::{PushSampler, SkillKind, SkillSet};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -71,6 +71,11 @@ pub enum Values {
         /// Chooses the one at a position, and what goes with it.
         set: fn(&mut PlannerSettings, usize),
     },
+    /// One or more skills, by name with commas between.
+    Skills {
+        /// The field.
+        of: fn(&mut PlannerSettings) -> &mut SkillSet,
+    },
 }
 
 /// One of the choices that a setting has.
@@ -129,6 +134,9 @@ macro_rules! planner_settings {
     (@values $field:ident (real $low:literal to $high:literal by $step:literal)) => {
         Values::Real { range: [$low, $high], step: $step, of: |settings| &mut settings.$field }
     };
+    (@values $field:ident (skills)) => {
+        Values::Skills { of: |settings| &mut settings.$field }
+    };
     (@values $field:ident ($choices:ident of $type:ty, $set:expr)) => {
         Values::Choice {
             choices: &$choices,
@@ -151,6 +159,9 @@ planner_settings! {
     candidates: usize = [80, 80], Form, "candidates", "candidates", "", "N",
         (whole 0 to 1000),
         "Push candidates drawn per decision (the paper's k, for which it gives no number)";
+    skills: SkillSet = [SkillSet::default(), SkillSet::default()], Form, "skills", "skills", "", "NAMES",
+        (skills),
+        "What the arm may do beside looking: names of skills with commas between; in the paper it pushes alone";
     push_sampler: PushSampler = [PushSampler::Frontier, PushSampler::Frontier], Form, "push-sampler", "drawn", "", "frontier|hidden",
         (SAMPLERS of PushSampler, |settings, sampler| settings.push_sampler = sampler),
         "Where push candidates are drawn: at the frontier, as in the paper, or at what stands before space that no look has \
@@ -234,6 +245,7 @@ impl Setting {
             Values::Whole { of, .. } => of(&mut settings).to_string(),
             Values::Real { of, .. } => of(&mut settings).to_string(),
             Values::Choice { choices, get, .. } => choices[get(&settings)].name.to_owned(),
+            Values::Skills { of } => of(&mut settings).to_string(),
         }
     }
 
@@ -256,23 +268,25 @@ impl Setting {
                 let at = choices.iter().position(|choice| choice.name == text);
                 set(settings, at.ok_or_else(refused)?);
             }
+            Values::Skills { of } => *of(settings) = text.parse().map_err(|_| refused())?,
         }
         Ok(())
     }
 
-    /// What it may be: `0 to 100000`, `all or unseen`.
+    /// What it may be: `0 to 100000`, `all or unseen`, `one or more of the skills, with commas between`.
     pub fn range(&self) -> String {
         match &self.values {
             Values::Whole { range: [low, high], .. } => format!("{low} to {high}"),
             Values::Real { range: [low, high], .. } => format!("{low} to {high}"),
             Values::Choice { choices, .. } => choices.iter().map(|choice| choice.name).collect::<Vec<_>>().join(" or "),
+            Values::Skills { .. } => format!("one or more of {}, with commas between", SkillKind::NAMES.join(", ")),
         }
     }
 
     /// The same with its kind and unit: `a number of nats from 0 to 100000`.
     pub fn limits(&self) -> String {
         let number = match (&self.values, self.unit) {
-            (Values::Choice { .. }, _) => return self.range(),
+            (Values::Choice { .. } | Values::Skills { .. }, _) => return self.range(),
             (_, share @ ("share" | "probability")) => share.to_owned(),
             (Values::Whole { .. }, "") => "whole number".to_owned(),
             (Values::Whole { .. }, unit) => format!("whole number of {unit}"),
@@ -306,6 +320,7 @@ mod tests {
             Values::Whole { range, .. } => range.iter().map(usize::to_string).collect(),
             Values::Real { range, .. } => range.iter().map(f32::to_string).collect(),
             Values::Choice { choices, .. } => choices.iter().map(|choice| choice.name.to_owned()).collect(),
+            Values::Skills { .. } => vec![SkillSet::default().to_string(), SkillSet::of(SkillKind::ALL).to_string()],
         }
     }
 

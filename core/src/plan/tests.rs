@@ -1,11 +1,12 @@
 //! Decisions on a small shelf: 1 cm voxels, a dozen views, a few boxes.
 
 use super::*;
-use crate::belief::{Classical, PushPrediction, SweptPush, evidence};
+use crate::belief::{Classical, FloorPlan, Intervention, Prediction, SOLID, evidence};
 use crate::camera::{Intrinsics, MapObservation, View};
 use crate::gain::{Coverage, GainField, Openings, RayDensity, gain_of_views, gain_together};
 use crate::grid::{Grid, VoxelSet, Window};
 use crate::scene::{CLASS_COUNT, Shelf};
+use crate::skill::push::{Push, SweptPush};
 use crate::{Point, Pose, Vector};
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
@@ -86,13 +87,13 @@ impl BeliefUpdate for Prophet {
         belief.clone()
     }
 
-    fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+    fn predict(&self, belief: &Belief, pushes: &[Intervention]) -> Vec<Prediction> {
         let grid = &belief.grid;
         let voxel = match self {
             Self::Forgets => [1.0, 1.0],
             Self::Knows => [1.0, 1000.0],
         };
-        let prediction = PushPrediction {
+        let prediction = Prediction {
             window: Window::whole(grid),
             occupancy: vec![voxel; grid.voxel_count()],
             semantics: vec![[1.0; CLASS_COUNT]; grid.cell_count()],
@@ -148,7 +149,7 @@ impl Table {
             belief.occupancy.iter_mut().for_each(|voxel| voxel[1] += sure);
             belief
         };
-        let really_push = |motions: &[PushMotion]| {
+        let really_push = |motions: &[PhasedMotion]| {
             let told = |at: usize| self.really.get(at).copied().unwrap_or_default();
             (0..motions.len()).map(|at| self.truth(told(at))).collect()
         };
@@ -200,7 +201,7 @@ impl Table {
 }
 
 fn is_push(decision: &Decision) -> bool {
-    matches!(decision.action, Action::Push(_))
+    matches!(decision.action, Action::Manipulate(_))
 }
 
 /// Numbers, from 1, of the steps that push.
@@ -279,9 +280,9 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
             belief.clone()
         }
 
-        fn predict_pushes(&self, belief: &Belief, pushes: &[SweptPush]) -> Vec<PushPrediction> {
+        fn predict(&self, belief: &Belief, pushes: &[Intervention]) -> Vec<Prediction> {
             let cleared = |a: &[f32; 2]| if a[0] > a[1] { [1.0, 100.0] } else { *a };
-            let prediction = PushPrediction {
+            let prediction = Prediction {
                 window: Window::whole(&belief.grid),
                 occupancy: belief.occupancy.iter().map(cleared).collect(),
                 semantics: belief.semantics.clone(),
@@ -299,7 +300,7 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     let decision = table.decide(PolicyKind::Mem);
     let gapless = RayDensity::gapless(&table.belief.grid, &table.views);
     assert_eq!(decision.igv, gain_together(&field, &table.views, &decision.pair, gapless));
-    let prediction = Clears.predict_pushes(&table.belief, &[swept()]).remove(0);
+    let prediction = Clears.predict(&table.belief, &[swept(&table.belief)]).remove(0);
     let opened =
         Openings::new(&field, &table.views, &ids, RayDensity::COARSE).under_each(std::slice::from_ref(&prediction))[0];
     let gain = Gain::new(Counted::Unseen, &table.belief, &table.seen);
@@ -316,7 +317,7 @@ fn where_unseen_voxels_count_a_push_is_worth_what_it_opens() {
     table.settings.patience = 0.9 * decision.igm / decision.igv;
     table.settings.push_floor = 0.0;
     let decision = table.decide(PolicyKind::Mem);
-    assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Push(best.push)));
+    assert_eq!((decision.reason, decision.action), (Reason::PushTellsMore, Action::Manipulate(best.manipulation)));
 
     // What a push only blurs is worth nothing.
     (0..table.belief.grid.voxel_count()).for_each(|voxel| table.seen.insert(voxel));
@@ -387,16 +388,16 @@ fn disturbance_counts_blurred_labels_and_never_rewards() {
     table.settings = PlannerSettings { patience: 1.1 * decision.igm / decision.igv, ..PlannerSettings::default() };
     assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::LookTellsMore);
 
-    let mut sharper = Prophet::Forgets.predict_pushes(&table.belief, &[swept()]).remove(0);
+    let mut sharper = Prophet::Forgets.predict(&table.belief, &[swept(&table.belief)]).remove(0);
     sharper.semantics.iter_mut().for_each(|a| a[14] += 100.0);
     assert_eq!(disturbance(&table.belief, &sharper), 0.0);
 }
 
-fn swept() -> SweptPush {
+fn swept(belief: &Belief) -> Intervention {
     let grid = half_seen().grid;
     let mut swept = VoxelSet::empty(&grid);
     (0..grid.voxel_count()).step_by(97).for_each(|index| swept.insert(index));
-    SweptPush { push: push(), swept }
+    SweptPush { push: push(), swept }.intervention(belief, &FloorPlan::new(belief, SOLID))
 }
 
 #[test]

@@ -2,11 +2,11 @@
 
 use super::worth::Worth;
 use super::{CandidateRecord, Gain, PlannerSettings, Situation};
-use crate::arm::{ArmTool, PushMotion};
-use crate::belief::{Belief, PushPrediction, SweptPush};
-use crate::grid::VoxelSet;
-use crate::push::{Candidate, PushSampler, PushTruth, sample};
-use crate::rng::{ChaCha8Rng, stream};
+use crate::arm::PhasedMotion;
+use crate::belief::{Belief, FloorPlan, Intervention, Prediction, SOLID};
+use crate::rng::stream;
+use crate::skill::{Candidate, Ground, PushSampler, PushTruth, SkillSet, random_candidate};
+use rayon::prelude::*;
 
 /// The pushes that were weighed.
 pub(super) struct Weighed {
@@ -14,34 +14,28 @@ pub(super) struct Weighed {
     /// Position of the push with the largest gain; `None` when no candidate is feasible.
     pub best: Option<usize>,
     /// The arm's motion for each candidate; `None` for those that were rejected.
-    pub motions: Vec<Option<PushMotion>>,
+    pub motions: Vec<Option<PhasedMotion>>,
 }
 
 impl Weighed {
     /// The arm's motion for the best push.
-    pub(super) fn take_motion(&mut self) -> Option<PushMotion> {
+    pub(super) fn take_motion(&mut self) -> Option<PhasedMotion> {
         self.best.and_then(|at| self.motions[at].take())
     }
 }
 
-/// Draws the push candidates of a decision, rejected ones too, in their order: the same ones whenever it is asked.
+/// Draws the candidates of a decision, rejected ones too, skill by skill in their order: the same ones whenever it is asked.
 ///
-/// `seen` are the voxels that looks have seen, `actions` is the number of actions so far; [`sample`] says what else they
-/// depend on.
-pub fn draw_pushes(
-    settings: &PlannerSettings,
-    belief: &Belief,
-    seen: &VoxelSet,
-    arm: &ArmTool,
-    seed: u64,
-    actions: usize,
-) -> Vec<Candidate> {
-    let mut rng = push_stream(seed, actions);
-    sample(settings.push_sampler, belief, settings.counted.left_out(seen), arm, settings.candidates, &mut rng)
+/// `actions` is the number of actions so far; [`Skill::sample`](crate::skill::Skill::sample) says what else they depend on.
+pub fn draw_candidates(settings: &PlannerSettings, ground: &Ground<'_>, seed: u64, actions: usize) -> Vec<Candidate> {
+    let of = |kind: crate::skill::SkillKind| {
+        kind.sample(ground, settings.candidates, &mut stream(seed, kind.stream(), actions as u64))
+    };
+    settings.skills.kinds().flat_map(of).collect()
 }
 
 /// `Reg = min(0, H_s(belief) - H_s(predicted))`, nats.
-pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
+pub fn disturbance(belief: &Belief, prediction: &Prediction) -> f32 {
     prediction.semantic_entropy_drop(belief).min(0.0) as f32
 }
 
@@ -49,20 +43,24 @@ pub fn disturbance(belief: &Belief, prediction: &PushPrediction) -> f32 {
 pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>, gain: &Gain) -> Weighed {
     let (belief, update, views) = (situation.belief, situation.update, situation.views);
     let actions = situation.history.actions.len();
-    let drawn = draw_pushes(settings, belief, situation.seen, situation.arm, situation.seed, actions);
+    let drawn = draw_candidates(settings, &situation.ground(settings), situation.seed, actions);
     let mut candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
-    let motions: Vec<Option<PushMotion>> = drawn.iter().map(|drawn| drawn.motion.clone()).collect();
-    let (feasible, pushes): (Vec<usize>, Vec<SweptPush>) = drawn
-        .into_iter()
+    let motions: Vec<Option<PhasedMotion>> = drawn.iter().map(|drawn| drawn.motion.clone()).collect();
+    let solid = FloorPlan::new(belief, SOLID);
+    let (feasible, interventions): (Vec<usize>, Vec<Intervention>) = drawn
+        .into_par_iter()
         .enumerate()
         .filter(|(_, candidate)| candidate.rejection.is_none())
-        .map(|(at, candidate)| (at, candidate.swept))
+        .map(|(at, candidate)| {
+            let skill = candidate.manipulation.skill();
+            (at, skill.intervention(belief, &solid, candidate.swept))
+        })
         .unzip();
 
     let offered = situation.offered();
     let worth = Worth::new(gain, views, &offered);
-    let predictions = update.predict_pushes(belief, &pushes);
-    let mut best: Option<(usize, &PushPrediction)> = None;
+    let predictions = update.predict(belief, &interventions);
+    let mut best: Option<(usize, &Prediction)> = None;
     for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(&feasible) {
         candidates[at].gain = Some(gain);
         candidates[at].view = view;
@@ -86,7 +84,7 @@ pub(super) fn weigh_clairvoyantly(
     gain: &Gain,
 ) -> (Weighed, Option<PushTruth>) {
     let mut weighed = weigh_pushes(settings, situation, gain);
-    let (at, motions): (Vec<usize>, Vec<PushMotion>) =
+    let (at, motions): (Vec<usize>, Vec<PhasedMotion>) =
         weighed.motions.iter().enumerate().filter_map(|(at, motion)| Some((at, motion.clone()?))).unzip();
     let mut best: Option<(usize, PushTruth)> = None;
     for (at, truth) in at.into_iter().zip((situation.really_push)(&motions)) {
@@ -99,23 +97,20 @@ pub(super) fn weigh_clairvoyantly(
     (weighed, best.map(|(_, truth)| truth))
 }
 
-/// Draws one feasible push at random, from the frontier as in the paper, with those that were rejected on the way.
-pub(super) fn random_push(situation: &Situation<'_>) -> Weighed {
-    let (belief, arm) = (situation.belief, situation.arm);
-    let mut rng = push_stream(situation.seed, situation.history.actions.len());
-    let drawn = sample(PushSampler::Frontier, belief, None, arm, 1, &mut rng);
+/// Draws one feasible manipulation at random, pushes from the frontier as in the paper, with those that were rejected on the
+/// way.
+pub(super) fn random_push(situation: &Situation<'_>, skills: SkillSet) -> Weighed {
+    let (belief, arm, actions) = (situation.belief, situation.arm, situation.history.actions.len());
+    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier };
+    let drawn = random_candidate(skills, &ground, situation.seed, actions);
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());
     let motions = drawn.into_iter().map(|drawn| drawn.motion).collect();
     Weighed { candidates, best, motions }
 }
 
-fn push_stream(seed: u64, actions: usize) -> ChaCha8Rng {
-    stream(seed, "pushes", actions as u64)
-}
-
 fn record_of(candidate: &Candidate, situation: &Situation<'_>) -> CandidateRecord {
     let rejection = candidate.rejection.clone();
     let motion_s = candidate.motion.as_ref().map(|motion| motion.duration_s(&situation.arm.arm));
-    CandidateRecord { rejection, motion_s, ..CandidateRecord::of(candidate.swept.push) }
+    CandidateRecord { rejection, motion_s, ..CandidateRecord::of(candidate.manipulation) }
 }

@@ -8,7 +8,7 @@
 
 use super::CandidateRecord;
 use super::gain::{By, Gain};
-use crate::belief::PushPrediction;
+use crate::belief::Prediction;
 use crate::camera::{ViewArray, ViewId};
 use crate::gain::{Openings, RayDensity, RayGains, gain_per_voxel};
 use rayon::prelude::*;
@@ -38,7 +38,7 @@ impl Gain {
         &self,
         array: &ViewArray,
         offered: &[ViewId],
-        prediction: &PushPrediction,
+        prediction: &Prediction,
         best: Option<ViewId>,
     ) -> Option<Sources> {
         Some(match &self.0 {
@@ -85,7 +85,7 @@ impl<'a> Worth<'a> {
     }
 
     /// The view that counts, if it is one, and the worth in nats, of every predicted push.
-    pub(super) fn of_each(&self, predictions: &[PushPrediction]) -> Vec<(Option<ViewId>, f32)> {
+    pub(super) fn of_each(&self, predictions: &[Prediction]) -> Vec<(Option<ViewId>, f32)> {
         match &self.of {
             Of::View(rays) => {
                 let scale = (RayDensity::COARSE.stride_px as f32 / RayDensity::FULL.stride_px as f32).powi(2);
@@ -101,7 +101,7 @@ impl<'a> Worth<'a> {
 
     /// Completes what is known of the best push: its worth with all views and rays where it is that of one view, else the
     /// view to show with it.
-    pub(super) fn complete(&self, prediction: &PushPrediction, best: &mut CandidateRecord) {
+    pub(super) fn complete(&self, prediction: &Prediction, best: &mut CandidateRecord) {
         let after = self.gain.after(prediction);
         match self.of {
             Of::View(_) => {

@@ -3,6 +3,7 @@ use crate::belief::Classical;
 use crate::episode::{Agreement, EpisodeConfig, Overwrite, replay, resume};
 use crate::plan::{PlannerSettings, PolicyKind};
 use crate::scene::{Object, Scene, Shelf};
+use crate::skill::Push;
 use std::fs;
 use std::path::PathBuf;
 use std::time::SystemTime;
@@ -81,7 +82,7 @@ fn the_push_that_was_made_does_the_same_again_and_the_episode_stays_as_it_is() {
     let dir = tempfile::tempdir().expect("tempdir");
     let path = dir.path().join("e");
     let record = run(&path, PolicyKind::RandomPush5, 6).record().clone();
-    assert!(matches!(record.steps[4].action, Action::Push(_)), "{:?}", record.steps[4].decision.reason);
+    assert!(matches!(record.steps[4].action, Action::Manipulate(_)), "{:?}", record.steps[4].decision.reason);
     assert_eq!(probable_steps(&record), [(5, 1)]);
     let before = files(&path);
     let (probes, difference) = probed(&path, &[5]).expect("probed");
@@ -197,7 +198,7 @@ fn made_up(rows: &[(Option<f32>, usize, usize, f64)], chosen: Option<usize>) -> 
     let names = |count: usize| vec!["tomato_can#0".to_owned(); count];
     let push = |(at, &(gain, won, lost, litres)): (usize, &(Option<f32>, usize, usize, f64))| ProbedPush {
         candidate: at,
-        push: Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 },
+        manipulation: Push { start: [0.0, 0.1, 0.06], direction_deg: 90.0, length_m: 0.1 }.into(),
         promised_gain: gain,
         promised_reg: gain.map(|_| 0.0),
         opened_voxels: (litres * 8000.0) as usize,

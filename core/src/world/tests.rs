@@ -1,20 +1,19 @@
 use super::*;
 use crate::Vector;
 use crate::arm::ArmTool;
-use crate::arm::Push;
 use crate::belief::Belief;
-use crate::push::ArmClearance;
 use crate::rng::stream;
 use crate::scene::ClassId;
+use crate::skill::{ArmClearance, Push, Skill};
 use crate::solid::{ConvexPart, Solid};
 use nalgebra::{Translation3, UnitQuaternion};
 use std::sync::Arc;
 
 /// Carries a push out by the standard arm, by its motion in a shelf of which nothing is known.
-fn push_in(world: &mut World, arm: &ArmTool, push: &Push) -> PushOutcome {
+fn push_in(world: &mut World, arm: &ArmTool, push: &Push) -> ManipulationOutcome {
     let belief = Belief::uniform(shelf().grid());
     let clearance = ArmClearance::new(arm, &belief);
-    let motion = clearance.motion(push, &clearance.target_of(push), &mut stream(1, "test pushes", 0));
+    let motion = push.plan(&clearance, &mut stream(1, "test pushes", 0));
     world.execute(&arm.arm, &motion.expect("within reach"))
 }
 
@@ -98,7 +97,7 @@ fn a_push_moves_what_it_meets_and_nothing_else() {
     assert!((outcome.displacement_m[0] - 0.08).abs() < 0.006, "{:?}", outcome);
     assert!((world.bodies()[0].world_from_body.translation.y - 0.23).abs() < 0.006);
     assert_eq!((outcome.displacement_m[1], poses(&world)[1]), (0.0, before));
-    assert!(!outcome.stalled && (outcome.pushed_m - 0.10).abs() < 1e-6 && outcome.dropped.is_empty());
+    assert!(!outcome.stalled && (outcome.way_m - 0.10).abs() < 1e-6 && outcome.dropped.is_empty());
     // Along 0.1 m at 0.1 m/s at least, and a rest.
     assert!(outcome.arm_s > 1.0 && outcome.duration_s >= outcome.arm_s, "{outcome:?}");
     assert!(outcome.link_contacts.is_empty() && outcome.arm_in_shelf_m < 0.002, "{outcome:?}");
@@ -161,7 +160,7 @@ fn a_jammed_tool_stalls_and_nothing_explodes() {
     let outcome = push_in(&mut world, &arm(), &push);
     assert!(outcome.stalled, "{outcome:?}");
     // 1 cm to the first box, then the play of 2 x 3 mm and 2.4 cm to the wall.
-    assert!(outcome.pushed_m > 0.02 && outcome.pushed_m < 0.06, "{outcome:?}");
+    assert!(outcome.way_m > 0.02 && outcome.way_m < 0.06, "{outcome:?}");
     assert!(world.deepest_overlap_m() < 0.002, "{}", world.deepest_overlap_m());
     assert!(world.kinetic_energy_j() < 1e-6);
     assert!(outcome.dropped.is_empty());

@@ -84,11 +84,12 @@ fn the_layout_of_pushes_begins_with_the_chosen_push_and_a_branch_keeps_the_one_t
     let decision = window.session().pending.clone().expect("a decision");
     assert_eq!(window.model().candidate, None);
     window.layout(LayoutKind::Push);
-    let pushed = decision.candidates.iter().position(|candidate| Action::Push(candidate.push) == decision.action);
+    let pushed =
+        decision.candidates.iter().position(|candidate| Action::Manipulate(candidate.manipulation) == decision.action);
     let first = pushed.or(decision.best_push).expect("a push was weighed");
     assert_eq!(window.model().candidate, Some(first));
     let preview = window.model().preview.clone().expect("a prediction, unasked");
-    assert_eq!((preview.of, preview.push), ((window.session().id, 4), decision.candidates[first].push));
+    assert_eq!((preview.of, preview.manipulation), ((window.session().id, 4), decision.candidates[first].manipulation));
 
     // Another one is chosen, and the episode is branched.
     let other =
@@ -102,7 +103,7 @@ fn the_layout_of_pushes_begins_with_the_chosen_push_and_a_branch_keeps_the_one_t
     assert_eq!(branch.pending.as_deref(), Some(&*decision), "what was decided holds in the branch");
     assert_eq!(window.model().candidate, Some(other));
     let preview = window.model().preview.clone().expect("a prediction");
-    assert_eq!((preview.of, preview.push), ((branch.id, 4), decision.candidates[other].push));
+    assert_eq!((preview.of, preview.manipulation), ((branch.id, 4), decision.candidates[other].manipulation));
     assert_eq!(branch.title(), format!("{title} from step 4"));
     assert!(branch.path.to_string_lossy().ends_with("-from-step-4"), "{}", branch.path.display());
     assert!(window.sees(&format!("{title} from step 4")));
@@ -119,17 +120,17 @@ fn a_push_is_previewed_done_and_reviewed() {
     let feasible = decision.candidates.iter().position(|candidate| candidate.rejection.is_none()).expect("feasible");
     window.layout(LayoutKind::Push);
     window.hover_first(&format!("Push {feasible}, value"));
-    assert_eq!(window.model().hovered, Hovered::Push(decision.candidates[feasible].push));
+    assert_eq!(window.model().hovered, Hovered::Manipulation(decision.candidates[feasible].manipulation));
     window.click_first(&format!("Push {feasible}, value"));
     let preview = window.model().preview.clone().expect("a prediction");
-    assert_eq!((preview.of.1, preview.push), (4, decision.candidates[feasible].push));
+    assert_eq!((preview.of.1, preview.manipulation), (4, decision.candidates[feasible].manipulation));
     assert!(!preview.swept.is_empty());
     for map in ["Map of the push: now", "Map of the push: predicted", "Map of the push: change"] {
         assert!(window.sees(map), "{map}");
     }
     window.click("Push this");
     assert_eq!(window.steps(), 5, "{:?}", window.toasts());
-    assert_eq!(window.session().record.steps[4].action, Action::Push(decision.candidates[feasible].push));
+    assert_eq!(window.session().record.steps[4].action, Action::Manipulate(decision.candidates[feasible].manipulation));
     // The arm can be moved along what it did.
     assert!(window.sees("The arm in step 5") && window.sees("approach"));
     let scrubbed = |window: &Window| window.model().scrubbed.at_s((window.session().id, 5));

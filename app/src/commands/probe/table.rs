@@ -3,6 +3,7 @@
 use super::{Probed, ProbedStep};
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::probe::{MeasureSummary, ProbedPush, StepProbe, StepSummary};
+use nudge_core::skill::SkillKind;
 use std::fmt::Write as _;
 
 /// Width of the column that names a decision.
@@ -47,9 +48,10 @@ pub(super) fn pushes(probed: &Probed, step: &ProbedStep) -> String {
 }
 
 fn row(mark: &str, probed: &ProbedPush) -> String {
-    let push = &probed.push;
-    let [x, y, _] = push.start;
-    let name = format!("{:.0} mm at {:.0}° from ({x:.2}, {y:.2})", push.length_m * 1e3, push.direction_deg);
+    let (done, mut name) = (&probed.manipulation, probed.manipulation.describe().short);
+    if done.kind() != SkillKind::default() {
+        name = format!("{} {name}", done.kind().name());
+    }
     let nats = |value: Option<f32>| value.map_or("-".to_owned(), |value| format!("{value:.1}"));
     let mut remarks: Vec<String> = Vec::new();
     let mut remark = |what: &str, names: &[String]| {
@@ -64,7 +66,7 @@ fn row(mark: &str, probed: &ProbedPush) -> String {
     if probed.jammed {
         remarks.push("jams".to_owned());
     }
-    let came = format!("{:.0} of {:.0}", probed.pushed_m * 1e3, push.length_m * 1e3);
+    let came = format!("{:.0} of {:.0}", probed.pushed_m * 1e3, done.skill().way_m() * 1e3);
     let text = format!(
         "{mark} {name:<33} {:>12} {:>9}  {:>8.3} {:>4} {:>4}  {came:>12} {:>7.3}  {}",
         nats(probed.promised_gain),
@@ -178,7 +180,8 @@ pub(super) fn csv(episodes: &[Probed]) -> String {
 fn fields(probed: &Probed, probe: &StepProbe, at: usize, push: &ProbedPush) -> [String; COLUMNS.len()] {
     let flag = |is_so: bool| u8::from(is_so).to_string();
     let nats = |value: Option<f32>| value.map_or(String::new(), |value| value.to_string());
-    let [x, y, z] = push.push.start;
+    let told = push.manipulation.describe();
+    let number = |field| told.value(field).map_or_else(String::new, |value| value.to_string());
     [
         probed.episode.display().to_string(),
         probed.scene.clone(),
@@ -189,11 +192,11 @@ fn fields(probed: &Probed, probe: &StepProbe, at: usize, push: &ProbedPush) -> [
         push.candidate.to_string(),
         flag(probe.chosen == Some(at)),
         flag(probe.made == Some(at)),
-        x.to_string(),
-        y.to_string(),
-        z.to_string(),
-        push.push.direction_deg.to_string(),
-        push.push.length_m.to_string(),
+        number("start_x_m"),
+        number("start_y_m"),
+        number("start_z_m"),
+        number("direction_deg"),
+        number("length_m"),
         nats(push.promised_gain),
         nats(push.promised_reg),
         push.opened_voxels.to_string(),

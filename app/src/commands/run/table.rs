@@ -59,9 +59,8 @@ fn action_words(step: &StepRecord) -> String {
             format!("look {} (view of the push)", view.0)
         }
         Action::Look { view } => format!("look {}", view.0),
-        Action::Push(push) => {
-            let [x, y, _] = push.start;
-            format!("push {:.0} mm at {:.0}° from ({x:.2}, {y:.2})", push.length_m * 1e3, push.direction_deg)
+        Action::Manipulate(manipulation) => {
+            format!("{} {}", manipulation.kind().name(), manipulation.describe().short)
         }
     }
 }
@@ -140,7 +139,7 @@ fn hidden_found(column: &Column) -> usize {
 }
 
 fn pushes(record: &EpisodeRecord) -> usize {
-    record.steps.iter().filter(|step| matches!(step.action, Action::Push(_))).count()
+    record.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).count()
 }
 
 fn total(column: &Column, part: impl Fn(&StepRecord) -> f64) -> f64 {

@@ -7,15 +7,13 @@ use crate::workbench::model::{GainSource, LayoutKind, Preview};
 use crate::workbench::panels::weighed;
 use crate::workbench::session::{Activity, Session, SessionId, branch_suffix};
 use crate::workbench::worker::{Begin, Order, Worker};
-use nudge_core::arm::Push;
-use nudge_core::belief::SweptPush;
 use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
 use nudge_core::gain::RayDensity;
 use nudge_core::plan::{Action, Decision, Gain, PolicyKind, Reason};
-use nudge_core::push::swept_by;
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
+use nudge_core::skill::{Manipulation, intended};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -374,18 +372,18 @@ impl App {
         self.spawn(Opening { kept: Some(kept), ..Opening::of(title) }, Begin::Branch { of: Box::new(of), steps, out });
     }
 
-    fn preview(&mut self, push: Push) {
+    fn preview(&mut self, manipulation: Manipulation) {
         let Some(session) = self.model.session() else { return };
         let moment = session.moment(self.model.cursor).clone();
         let (of, setup) = ((session.id, moment.step), session.setup.clone());
-        self.asked_preview = Some((of, push));
+        self.asked_preview = Some((of, manipulation));
         let Some(update) = setup.update.clone() else { return };
         self.background.preview.ask(move |_| {
             let belief = moment.belief.belief();
-            let swept = swept_by(&setup.arm, &belief, &push);
-            let swept = SweptPush { push, swept };
-            let prediction = update.predict_pushes(&belief, std::slice::from_ref(&swept)).pop()?;
-            Some(Preview { of, push, prediction: Arc::new(prediction), swept: Arc::new(swept.swept) })
+            let intervention = intended(&setup.arm, &belief, &manipulation);
+            let prediction = update.predict(&belief, std::slice::from_ref(&intervention)).pop()?;
+            let (prediction, swept) = (Arc::new(prediction), Arc::new(intervention.swept));
+            Some(Preview { of, manipulation, prediction, swept })
         });
     }
 
@@ -420,7 +418,7 @@ impl App {
         let of = (session.id, self.model.cursor.min(session.steps()));
         let Some(decision) = session.decision_after(of.1) else { return };
         let chosen = self.model.candidate.or_else(|| weighed::looked_at_first(decision));
-        let push = chosen.and_then(|at| decision.candidates.get(at)).map(|candidate| candidate.push);
+        let push = chosen.and_then(|at| decision.candidates.get(at)).map(|candidate| candidate.manipulation);
         self.model.candidate = chosen;
         if let Some(push) = push.filter(|push| self.asked_preview != Some((of, *push))) {
             self.preview(push);

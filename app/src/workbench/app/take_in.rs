@@ -177,7 +177,7 @@ impl App {
             self.model.candidate = clicked.instance;
             let decision = self.model.session().and_then(|session| session.decision_after(self.model.cursor));
             let candidate = clicked.instance.and_then(|at| decision?.candidates.get(at));
-            if let Some(push) = candidate.map(|candidate| candidate.push) {
+            if let Some(push) = candidate.map(|candidate| candidate.manipulation) {
                 self.carry_out(Command::Preview(push));
             }
         }
@@ -315,7 +315,7 @@ impl App {
             model.picked,
             model.view,
             model.candidate,
-            model.preview.as_ref().map(|preview| (preview.of, preview.push)),
+            model.preview.as_ref().map(|preview| (preview.of, preview.manipulation)),
             model.gain_source.as_ref().map(|source| (source.of, source.view)),
         );
         if key == self.asked_space {

@@ -124,10 +124,11 @@ pub fn decisions_csv(session: &Session) -> String {
                 row.push(view.0.to_string());
                 row.extend((0..5).map(|_| String::new()));
             }
-            Action::Push(push) => {
+            Action::Manipulate(manipulation) => {
                 row.push(String::new());
-                row.extend(push.start.map(|v| v.to_string()));
-                row.extend([push.direction_deg.to_string(), push.length_m.to_string()]);
+                let told = manipulation.describe();
+                let number = |field| told.value(field).map_or_else(String::new, |value| value.to_string());
+                row.extend(["start_x_m", "start_y_m", "start_z_m", "direction_deg", "length_m"].map(number));
             }
         }
         let pair = |at: usize| decision.pair.get(at).map_or(String::new(), |view| view.0.to_string());
@@ -195,6 +196,6 @@ pub fn write_tables(session: &Session, into: &Path) -> Result<Vec<PathBuf>> {
 fn kind(action: &Action) -> &'static str {
     match action {
         Action::Look { .. } => "look",
-        Action::Push(_) => "push",
+        Action::Manipulate(manipulation) => manipulation.kind().name(),
     }
 }

@@ -1,18 +1,26 @@
-//! Pushes as arrows on a floor map.
+//! Manipulations as arrows and lines on a floor map.
 
 use super::floor::Frame;
 use super::legend;
-use nudge_core::arm::Push;
 use nudge_core::plan::CandidateRecord;
+use nudge_core::skill::{Arrow, Outline};
 use re_viewer::external::egui::{self, Color32, Painter, Pos2, Shape, Stroke, Ui, Vec2};
 
 /// How near the pointer has to be to an arrow, points.
 const NEAR: f32 = 7.0;
 
-/// Both ends of a push on the screen.
-pub fn ends(frame: &Frame, push: &Push) -> [Pos2; 2] {
-    let end = push.end_point();
-    [frame.place([push.start[0], push.start[1]]), frame.place([end.x, end.y])]
+/// Both ends of a way on the screen.
+pub fn ends(frame: &Frame, arrow: &Arrow) -> [Pos2; 2] {
+    [arrow.start, arrow.end()].map(|end| frame.place([end.x, end.y]))
+}
+
+/// Draws the lines beside the ways of a manipulation.
+pub fn lines(painter: &Painter, frame: &Frame, outline: &Outline) {
+    for line in &outline.lines {
+        let points: Vec<Pos2> = line.iter().map(|point| frame.place([point.x, point.y])).collect();
+        painter.add(Shape::line(points.clone(), Stroke::new(3.4, Color32::from_black_alpha(200))));
+        painter.add(Shape::line(points, Stroke::new(1.4, Color32::WHITE)));
+    }
 }
 
 /// The arrow nearest to the pointer, if one is near.

@@ -77,7 +77,7 @@ impl Subject<'_> {
         }
         let action = match outcome.record.action {
             Action::Look { view } => format!("look from view {}", view.0),
-            Action::Push(_) => "push".to_owned(),
+            Action::Manipulate(done) => done.kind().name().to_owned(),
         };
         (!causes.is_empty()).then_some(Change { step: after.step, action, causes, from_to })
     }
@@ -133,7 +133,7 @@ impl Subject<'_> {
         let update = if self.session.record.config.belief == CNABU { "network" } else { "belief update" };
         match outcome.record.action {
             Action::Look { .. } => format!("{update}, not seen"),
-            Action::Push(_) => format!("{update}, neither swept nor predicted to change"),
+            Action::Manipulate(_) => format!("{update}, neither swept nor predicted to change"),
         }
     }
 

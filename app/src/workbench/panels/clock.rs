@@ -61,7 +61,7 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {
                         let Some(moment) = moments.next() else { break };
                         let pushed = matches!(
                             moment.outcome.as_ref().map(|outcome| outcome.record.action),
-                            Some(Action::Push(_))
+                            Some(Action::Manipulate(_))
                         );
                         // The first step at which the two of a comparison differ.
                         let parts = if parting == Some(step) { "≠" } else { "" };

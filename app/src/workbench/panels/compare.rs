@@ -135,7 +135,10 @@ fn parting(ui: &mut Ui, model: &Model, a: &Session, b: &Session, ask: &mut Vec<C
         let record = session.record.steps.get(step - 1);
         record.map_or_else(String::new, |record| match record.action {
             Action::Look { view } => format!("looks from view {}", view.0),
-            Action::Push(push) => format!("pushes {:.0} mm towards {:.0}°", push.length_m * 1e3, push.direction_deg),
+            Action::Manipulate(manipulation) => {
+                let kind = manipulation.kind();
+                manipulation.describe().words.replacen(kind.name(), kind.plural(), 1)
+            }
         })
     };
     ui.horizontal_wrapped(|ui| {

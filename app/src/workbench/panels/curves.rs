@@ -202,7 +202,7 @@ impl Curves<'_> {
     fn pushes(&self, [low, high]: [f64; 2]) -> Vec<[f64; 2]> {
         let y = low + 0.04 * (high - low);
         let steps = self.session.record.steps.iter();
-        steps.filter(|step| matches!(step.action, Action::Push(_))).map(|step| [step.index as f64, y]).collect()
+        steps.filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| [step.index as f64, y]).collect()
     }
 }
 

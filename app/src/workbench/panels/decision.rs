@@ -200,7 +200,7 @@ pub fn push_table(
         ui.weak("No push is feasible here");
         table::Touched::default()
     } else {
-        let columns = weighed::push_columns(decision.counted());
+        let columns = weighed::push_columns(decision);
         table::show(ui, "pushes", &columns, rows, sort, height)
     };
     if refused > 0 {
@@ -212,9 +212,9 @@ pub fn push_table(
 
 /// What pointing at or clicking a push leads to.
 pub(super) fn apply_push(table: table::Touched, decision: &Decision, touched: &mut Touched, ask: &mut Vec<Command>) {
-    let push = |at: usize| decision.candidates.get(at).map(|candidate| candidate.push);
-    if let Some(push) = table.over.and_then(push) {
-        touched.over = Some(Hovered::Push(push));
+    let push = |at: usize| decision.candidates.get(at).map(|candidate| candidate.manipulation);
+    if let Some(manipulation) = table.over.and_then(push) {
+        touched.over = Some(Hovered::Manipulation(manipulation));
     }
     if let Some((at, push)) = table.clicked.and_then(|at| Some((at, push(at)?))) {
         touched.candidate = Some(at);
@@ -236,7 +236,7 @@ pub fn push_button(ui: &mut Ui, session: &Session, model: &Model, decision: &Dec
     if do_instead(ui, session, model.cursor, "Push this", &title, missing)
         && let Some((_, candidate)) = chosen
     {
-        ask.push(Command::DoInstead(Action::Push(candidate.push)));
+        ask.push(Command::DoInstead(Action::Manipulate(candidate.manipulation)));
     }
 }
 

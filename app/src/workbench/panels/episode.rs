@@ -6,6 +6,7 @@ use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session, SessionId};
 use nudge_core::camera::{NoiseModel, ViewArray};
 use nudge_core::plan::{Place, PlannerSettings, PolicyKind, SETTINGS, Setting, Values};
+use nudge_core::skill::{SkillKind, SkillSet};
 use re_viewer::external::egui;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -290,6 +291,21 @@ fn setting_value(ui: &mut egui::Ui, planner: &mut PlannerSettings, setting: &Set
                     }
                 })
                 .response
+        }
+        Values::Skills { of } => {
+            let skills = of(planner);
+            let row = ui.horizontal(|ui| {
+                for &kind in SkillKind::ALL {
+                    let mut on = skills.has(kind);
+                    // One of them stays.
+                    let last = on && skills.len() == 1;
+                    if ui.add_enabled(!last, egui::Checkbox::new(&mut on, kind.name())).changed() {
+                        let others = skills.kinds().filter(|other| *other != kind);
+                        *skills = SkillSet::of(&others.chain(on.then_some(kind)).collect::<Vec<_>>());
+                    }
+                }
+            });
+            row.response
         }
     }
 }

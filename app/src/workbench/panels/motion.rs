@@ -5,7 +5,9 @@ use super::{heading, words};
 use crate::record::mishaps;
 use crate::workbench::model::Scrubbed;
 use crate::workbench::session::{Moment, SessionId};
+use nudge_core::arm::PhaseKind;
 use nudge_core::episode::StepOutcome;
+use nudge_core::plan::Action;
 use re_viewer::external::egui::{self, Ui};
 
 /// Draws times, mishaps and slider of the motion that led to `moment`, if there was one.
@@ -16,7 +18,7 @@ pub fn show(ui: &mut Ui, scrubbed: &mut Scrubbed, id: SessionId, moment: &Moment
     heading(
         ui,
         format!("The arm in step {}", moment.step),
-        "How the arm moved: to the view, or to the start of the push, along it and back",
+        "How the arm moved: to the view, or to the start of a contact, along it and back",
     );
     facts::show(ui, "arm motion", 2, &times(outcome, end));
     for mishap in mishaps(&outcome.record) {
@@ -46,9 +48,15 @@ pub fn show(ui: &mut Ui, scrubbed: &mut Scrubbed, id: SessionId, moment: &Moment
 fn times(outcome: &StepOutcome, end: f64) -> Vec<facts::Fact> {
     let seconds = |s: f64| format!("{} s", words::significant(s, 3));
     let mut facts = vec![fact("whole motion", seconds(end), "How long the arm moves, in its own time")];
-    if let (Some(push), true) = (&outcome.record.decision.motion, outcome.push_outcome.is_some()) {
-        facts.push(fact("approach", seconds(push.way_in.duration_s()), "From where the arm waits to the push's start"));
-        facts.push(fact("push", seconds(push.push.duration_s()), "Along the push"));
+    if let (Some(motion), Action::Manipulate(done)) = (&outcome.record.decision.motion, &outcome.record.action) {
+        for phase in &motion.phases {
+            let (name, hint) = match phase.kind {
+                PhaseKind::Approach => ("approach", "From where the arm waits to where the contact begins"),
+                PhaseKind::Contact => (done.kind().name(), "In contact"),
+                PhaseKind::Retreat => ("retreat", "Back to where the arm waits"),
+            };
+            facts.push(fact(name, seconds(phase.motion.duration_s()), hint));
+        }
     }
     facts
 }

@@ -1,6 +1,6 @@
 //! What pushes would do: the candidates on the floor, and for a chosen one the prediction beside now and what happened.
 
-use super::arrows::{Look, arrow, ends, nearest, tag};
+use super::arrows::{Look, arrow, ends, lines, nearest, tag};
 use super::decision;
 use super::facts::{self, fact};
 use super::floor::{Drawn, FloorMap, Line, Outlines, in_window};
@@ -16,10 +16,10 @@ use crate::workbench::command::Command;
 use crate::workbench::derive::{Derived, MapKind};
 use crate::workbench::model::{Hovered, Model, Picked, Preview, Scrubbed};
 use crate::workbench::session::{Session, SessionId};
-use nudge_core::arm::Push;
-use nudge_core::belief::{MOST_SURPRISING, PushPrediction};
+use nudge_core::belief::{MOST_SURPRISING, Prediction};
 use nudge_core::grid::Grid;
 use nudge_core::plan::{Action, CandidateRecord, DISTURBANCE, Decision};
+use nudge_core::skill::Manipulation;
 use re_viewer::external::egui::{self, Color32, Pos2, RichText, TextureHandle, Tooltip, Ui};
 use std::sync::Arc;
 
@@ -29,8 +29,8 @@ const APRON_M: f32 = 0.05;
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shown {
     Now,
-    Predicted(Push),
-    Change(Push),
+    Predicted(Manipulation),
+    Change(Manipulation),
     After,
     Surprise,
 }
@@ -174,12 +174,12 @@ impl Here<'_> {
             .iter()
             .enumerate()
             .filter(|(_, candidate)| state.rejected || candidate.rejection.is_none())
-            .map(|(at, candidate)| (at, candidate, ends(&drawn.frame, &candidate.push)))
+            .map(|(at, candidate)| (at, candidate, ends(&drawn.frame, &candidate.manipulation.arrow())))
             .filter(|(_, _, ends)| ends.iter().all(|end| end.x.is_finite() && end.y.is_finite()))
             .collect();
         let over = drawn.response.hover_pos().and_then(|pointer| nearest(&arrows, pointer));
         let hovered = match self.model.hovered {
-            Hovered::Push(push) => Some(push),
+            Hovered::Manipulation(manipulation) => Some(manipulation),
             _ => None,
         };
         let painter = ui.painter_at(drawn.response.rect);
@@ -188,7 +188,11 @@ impl Here<'_> {
         let order = ranked.iter().rev().filter_map(|at| arrows.iter().find(|arrow| arrow.0 == *at));
         let pushed = decision.pushed();
         for (at, candidate, ends) in order {
-            let picked = self.model.candidate == Some(*at) || over == Some(*at) || hovered == Some(candidate.push);
+            let picked =
+                self.model.candidate == Some(*at) || over == Some(*at) || hovered == Some(candidate.manipulation);
+            if picked {
+                lines(&painter, &drawn.frame, &candidate.manipulation.outline());
+            }
             let look = match decision.value_of(candidate) {
                 _ if candidate.rejection.is_some() => Look::Rejected,
                 Some(value) => Look::Weighed(legend::ink(Colormap::Cividis.of(value, range))),
@@ -201,12 +205,12 @@ impl Here<'_> {
             }
         }
         if let Some((at, candidate)) = over.and_then(|at| Some((at, decision.candidates.get(at)?))) {
-            touched.over = Some(Hovered::Push(candidate.push));
+            touched.over = Some(Hovered::Manipulation(candidate.manipulation));
             let text = describe(at, decision, candidate);
             Tooltip::for_widget(&drawn.response).at_pointer().gap(12.0).show(|ui| ui.label(text));
             if drawn.response.clicked() {
                 touched.candidate = Some(at);
-                ask.push(Command::Preview(candidate.push));
+                ask.push(Command::Preview(candidate.manipulation));
             }
         }
         if decision.candidates.iter().all(|candidate| decision.value_of(candidate).is_none()) {
@@ -233,25 +237,25 @@ impl Here<'_> {
         candidate: &CandidateRecord,
         ask: &mut Vec<Command>,
     ) {
-        heading(ui, format!("Push {at}"), "The push that is looked at; click another one in the table or on the map");
+        let name = words::capital(candidate.manipulation.kind().name());
+        heading(ui, format!("{name} {at}"), "What is looked at; click another one in the table or on the map");
         let nats = |value: Option<f32>| value.map_or("not weighed".to_owned(), words::nats);
-        let [x, y, _] = candidate.push.start;
-        let way = format!("{:.0} mm to {:.0}°", candidate.push.length_m * 1e3, candidate.push.direction_deg);
         let view = candidate.view.map_or("n/a".to_owned(), |view| view.0.to_string());
-        let place = format!("x {}, y {} m", words::metres(x), words::metres(y));
-        let facts = [
+        let mut facts = vec![
             fact("value", nats(decision.value_of(candidate)), "Gain + γ·Reg"),
             fact("gain", nats(candidate.gain), decision.counted().of_a_push()),
             fact("γ·Reg", nats(decision.disturbance_of(candidate)), DISTURBANCE),
             fact("best view", view, "The view with the largest gain under the predicted belief"),
-            fact("from", place, "Where the tip starts"),
-            fact("length", way.replace('-', "−"), "Planned length and direction; 90° is into the shelf"),
         ];
+        let told = candidate.manipulation.describe();
+        facts.extend(told.facts.into_iter().map(|told| fact(told.name, told.text.replace('-', "−"), told.hint)));
         facts::show(ui, "push numbers", 2, &facts);
         if let Some(rejection) = &candidate.rejection {
-            ui.label(format!("Rejected: {}", rejection));
+            ui.label(format!("Rejected: {}", candidate.manipulation.against(rejection)));
         }
-        let asked = |preview: &&Preview| preview.of == (self.session.id, self.step) && preview.push == candidate.push;
+        let asked = |preview: &&Preview| {
+            preview.of == (self.session.id, self.step) && preview.manipulation == candidate.manipulation
+        };
         match self.model.preview.as_ref().filter(asked) {
             Some(preview) => self.prediction(state, ui, preview, ask),
             None if self.session.setup.update.is_none() => {
@@ -268,23 +272,23 @@ impl Here<'_> {
             ui.weak("Painting the maps");
             return;
         };
-        let (prediction, push) = (&preview.prediction, preview.push);
+        let (prediction, done) = (&preview.prediction, preview.manipulation);
         let (grid, catalog) = (self.grid, &self.session.setup.catalog);
         let key = |shown: Shown| (self.session.id, self.step, shown);
         let ctx = ui.ctx().clone();
         let now = self.now(state, &ctx);
-        let predicted = state.textures.get(&ctx, key(Shown::Predicted(push)), || {
+        let predicted = state.textures.get(&ctx, key(Shown::Predicted(done)), || {
             textures::of_rgb(&picture::paint(&grid, |cell| {
                 let at = in_window(&prediction.window, &grid, cell);
                 let after = at.and_then(|at| prediction.semantics.get(at));
                 picture::semantics_rgb(after.unwrap_or(&derived.belief.semantics[cell]), catalog)
             }))
         });
-        let change = state.textures.get(&ctx, key(Shown::Change(push)), || {
+        let change = state.textures.get(&ctx, key(Shown::Change(done)), || {
             textures::of_rgb(&picture::paint(&grid, |cell| Colormap::Viridis.rgb(change_at(prediction, &grid, cell))))
         });
         let after = self.session.moments.get(self.step + 1).filter(|moment| {
-            moment.outcome.as_ref().is_some_and(|outcome| outcome.record.action == Action::Push(push))
+            moment.outcome.as_ref().is_some_and(|outcome| outcome.record.action == Action::Manipulate(done))
         });
         let happened = after.and_then(|moment| Some((moment, moment.truth.as_ref()?))).map(|(moment, truth)| {
             let labels = || textures::of_rgb(&picture::paint_labels(&grid, &truth.labels, catalog));
@@ -301,8 +305,11 @@ impl Here<'_> {
                 let picked = maps::picked_cell(self.model.picked, &grid);
                 let map = FloorMap { grid: &grid, picture, outlines, picked, apron_m: 0.0, name: &name };
                 let drawn: Drawn = map.show(ui, width);
-                let way = ends(&drawn.frame, &push);
-                arrow(&ui.painter_at(drawn.response.rect), way, Look::Weighed(Color32::WHITE), false);
+                let painter = ui.painter_at(drawn.response.rect);
+                lines(&painter, &drawn.frame, &done.outline());
+                for way in done.outline().arrows {
+                    arrow(&painter, ends(&drawn.frame, &way), Look::Weighed(Color32::WHITE), false);
+                }
                 drawn.tell(|cell| {
                     let change = words::probability(change_at(prediction, &grid, cell));
                     format!("{}\nchanges with probability {change}", words::cell_place(&grid, grid.cell(cell)))
@@ -354,7 +361,8 @@ impl Here<'_> {
     /// Offers the way to the state before the nearest push.
     fn way_to_push(&self, ui: &mut Ui, ask: &mut Vec<Command>) {
         let steps = self.session.record.steps.iter();
-        let mut pushes = steps.filter(|step| matches!(step.action, Action::Push(_))).map(|step| step.index).peekable();
+        let mut pushes =
+            steps.filter(|step| matches!(step.action, Action::Manipulate(_))).map(|step| step.index).peekable();
         if pushes.peek().is_none() {
             ui.weak("No push was done in this episode");
         }
@@ -372,7 +380,7 @@ impl Here<'_> {
     /// What the push that led to the state at the cursor did.
     fn review(&self, state: &mut State, ui: &mut Ui) {
         let moment = self.session.moment(self.step);
-        let pushed = moment.outcome.as_ref().is_some_and(|outcome| outcome.push_outcome.is_some());
+        let pushed = moment.outcome.as_ref().is_some_and(|outcome| outcome.manipulated.is_some());
         if self.step == 0 || !pushed {
             return;
         }
@@ -425,20 +433,21 @@ fn value_range(decision: &Decision) -> [f32; 2] {
 }
 
 /// The probability that a push changes a cell; 0 outside the window of its prediction.
-fn change_at(prediction: &PushPrediction, grid: &Grid, cell: usize) -> f32 {
+fn change_at(prediction: &Prediction, grid: &Grid, cell: usize) -> f32 {
     let at = in_window(&prediction.window, grid, cell);
     at.and_then(|at| prediction.change.get(at)).copied().unwrap_or(0.0)
 }
 
 /// A candidate in words, for the tooltip.
 fn describe(at: usize, decision: &Decision, candidate: &CandidateRecord) -> String {
+    let name = words::capital(candidate.manipulation.kind().name());
     match (&candidate.rejection, decision.value_of(candidate)) {
-        (Some(rejection), _) => format!("Push {at}, rejected: {}", rejection),
-        (None, None) => format!("Push {at}: not weighed"),
+        (Some(rejection), _) => format!("{name} {at}, rejected: {}", candidate.manipulation.against(rejection)),
+        (None, None) => format!("{name} {at}: not weighed"),
         (None, Some(value)) => {
             let gain = words::nats(candidate.gain.unwrap_or(0.0));
             let reg = words::nats(decision.disturbance_of(candidate).unwrap_or(0.0));
-            format!("Push {at}: {}\ngain {gain}, γ·Reg {reg}", words::nats(value))
+            format!("{name} {at}: {}\ngain {gain}, γ·Reg {reg}", words::nats(value))
         }
     }
 }

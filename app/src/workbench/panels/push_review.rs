@@ -4,9 +4,10 @@ use super::facts::{self, fact};
 use super::{heading, words};
 use crate::record::decision::length;
 use crate::workbench::session::{Moment, SessionId};
-use nudge_core::belief::PushPrediction;
+use nudge_core::belief::Prediction;
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::grid::Grid;
+use nudge_core::plan::Action;
 use re_viewer::external::egui::Ui;
 
 /// A floor cell whose predicted probability of change is above this is predicted to change.
@@ -59,7 +60,7 @@ impl Review {
     }
 }
 
-fn predicted_cells(grid: &Grid, prediction: &PushPrediction) -> Vec<bool> {
+fn predicted_cells(grid: &Grid, prediction: &Prediction) -> Vec<bool> {
     let mut changes = vec![false; grid.cell_count()];
     for (cell, change) in prediction.window.cells(grid).zip(&prediction.change) {
         changes[cell] = *change > CHANGES;
@@ -70,8 +71,9 @@ fn predicted_cells(grid: &Grid, prediction: &PushPrediction) -> Vec<bool> {
 /// Draws what the push that led to `moment` did.
 pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Moment) {
     let Some(outcome) = moment.outcome.as_ref() else { return };
-    let Some(pushed) = outcome.push_outcome.as_ref() else { return };
-    let title = format!("What the push of step {} did", moment.step);
+    let Some(pushed) = outcome.manipulated.as_ref() else { return };
+    let Action::Manipulate(done) = &outcome.record.action else { return };
+    let title = format!("What the {} of step {} did", done.kind().name(), moment.step);
     heading(ui, title, "The prediction beside what really happened in the simulated shelf");
     let moved = pushed.displacement_m.iter().filter(|m| **m > 0.002).count();
     let total: f32 = pushed.displacement_m.iter().filter(|m| m.is_finite()).sum();
@@ -93,7 +95,7 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
         fact(
             "tool went",
             length(&outcome.record).unwrap_or_default(),
-            "How far the tip moved along the push, of the length that was planned",
+            "How far the tip moved in contact, of the length that was planned",
         ),
         fact("blocked", if pushed.stalled { "yes" } else { "no" }, "Whether the arm met too much force and stopped"),
         fact("dropped", dropped, "Objects that left the board"),
@@ -138,7 +140,7 @@ mod tests {
         let changed = before.changed_cells(&after);
         assert_eq!(changed, [true, false, false, false, false, true, false, false]);
         let window = Window { x: [0, 2], y: [0, 2] };
-        let prediction = PushPrediction {
+        let prediction = Prediction {
             window,
             occupancy: vec![[1.0; 2]; 4 * grid.dims[2]],
             semantics: vec![[1.0; CLASS_COUNT]; 4],

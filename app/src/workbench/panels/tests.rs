@@ -7,6 +7,7 @@ use crate::workbench::session::{Activity, Moment};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use nudge_core::plan::Action;
+use nudge_core::skill::Manipulation;
 use std::sync::Arc;
 
 mod form;
@@ -114,7 +115,10 @@ fn numbers_that_are_none_and_other_arrays_do_no_harm() {
         decision.gains = vec![f32::NAN, 3.0];
         decision.pair = vec![ViewId(60_000)];
         for candidate in &mut decision.candidates {
-            (candidate.gain, candidate.push.direction_deg) = (Some(f32::NAN), f32::NAN);
+            candidate.gain = Some(f32::NAN);
+            if let Manipulation::Push(push) = &mut candidate.manipulation {
+                push.direction_deg = f32::NAN;
+            }
         }
         decision.best_push = Some(9999);
         model.sessions[0].pending = Some(Arc::new(decision));
@@ -381,15 +385,16 @@ fn a_push_that_was_blocked_early_tells_the_length_that_was_planned() {
     let mut model = fixture::model();
     let moment = model.sessions[0].moments[4].clone();
     let mut outcome = (**moment.outcome.as_ref().expect("step 4")).clone();
-    let Action::Push(mut push) = outcome.record.action else { panic!("step 4 is a push") };
+    let Action::Manipulate(Manipulation::Push(mut push)) = outcome.record.action else { panic!("step 4 is a push") };
     push.length_m = 0.14;
-    outcome.record.action = Action::Push(push);
+    outcome.record.action = Action::Manipulate(push.into());
     // What it swept ends where the arm was blocked.
-    outcome.swept.as_mut().expect("swept").push.length_m = 0.05;
+    let early = nudge_core::skill::Push { length_m: 0.05, ..push };
+    outcome.swept.as_mut().expect("swept").manipulation = early.into();
     let report = outcome.record.push.as_mut().expect("a report");
     (report.pushed_m, report.stalled) = (0.05, true);
-    let pushed = outcome.push_outcome.as_mut().expect("an outcome");
-    (pushed.pushed_m, pushed.stalled) = (0.05, true);
+    let pushed = outcome.manipulated.as_mut().expect("an outcome");
+    (pushed.way_m, pushed.stalled) = (0.05, true);
     model.sessions[0].moments[4] = Arc::new(Moment { outcome: Some(Arc::new(outcome)), ..(*moment).clone() });
     model.cursor = 4;
     let harness = harness(push::State::default(), model);

@@ -5,6 +5,7 @@ use super::words;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::EpisodeRecord;
 use nudge_core::plan::{Action, Counted, DISTURBANCE, Decision, ranked};
+use nudge_core::skill::{Parameter, SkillKind, Unit};
 use std::collections::BTreeSet;
 
 /// How many views and pushes the tables list.
@@ -18,7 +19,7 @@ pub fn used_views(record: &EpisodeRecord, step: usize) -> BTreeSet<ViewId> {
             Action::Look { view } => {
                 used.insert(view);
             }
-            Action::Push(_) => used.clear(),
+            Action::Manipulate(_) => used.clear(),
         }
     }
     used
@@ -38,7 +39,7 @@ pub fn best_gain(decision: &Decision) -> f32 {
 pub fn looked_from(decision: &Decision) -> Option<ViewId> {
     match decision.action {
         Action::Look { view } => Some(view),
-        Action::Push(_) => None,
+        Action::Manipulate(_) => None,
     }
 }
 
@@ -104,17 +105,39 @@ pub fn view_rows(
     order.into_iter().take(LISTED).map(row).collect()
 }
 
+/// The numbers of the candidates that have a column: title and meaning, in the order in which skills tell them.
+fn numbers(decision: &Decision) -> Vec<(&'static str, &'static str)> {
+    let mut columns: Vec<(&str, &str)> = Vec::new();
+    let mut kinds: Vec<SkillKind> = Vec::new();
+    for candidate in &decision.candidates {
+        // Candidates of one skill have the same numbers.
+        if kinds.contains(&candidate.manipulation.kind()) {
+            continue;
+        }
+        kinds.push(candidate.manipulation.kind());
+        for parameter in candidate.manipulation.describe().parameters {
+            let Some(title) = parameter.column else { continue };
+            if !columns.iter().any(|(known, _)| *known == title) {
+                columns.push((title, parameter.hint));
+            }
+        }
+    }
+    columns
+}
+
 /// Columns of [`push_rows`].
-pub fn push_columns(counted: Counted) -> [Column; 7] {
-    [
+pub fn push_columns(decision: &Decision) -> Vec<Column> {
+    let mut columns = vec![
         Column { title: "Push", hint: "Number of the candidate, in the order drawn", width: 34.0 },
         Column { title: "Value", hint: "Gain + γ·Reg, nats: what is compared with looking", width: 50.0 },
-        Column { title: "Gain", hint: counted.of_a_push(), width: 50.0 },
+        Column { title: "Gain", hint: decision.counted().of_a_push(), width: 50.0 },
         Column { title: "γ·Reg", hint: DISTURBANCE, width: 42.0 },
-        Column { title: "To", hint: "Direction, degrees; 90 is into the shelf, 0 to the right", width: 34.0 },
-        Column { title: "mm", hint: "Planned length of the push, millimetres", width: 30.0 },
-        Column { title: "Note", hint: "Whether it is chosen or the best, or why it was rejected", width: 40.0 },
-    ]
+    ];
+    let width = |title: &str| if title == "mm" { 30.0 } else { 34.0 };
+    columns.extend(numbers(decision).into_iter().map(|(title, hint)| Column { title, hint, width: width(title) }));
+    let hint = "Whether it is chosen or the best, or why it was rejected";
+    columns.push(Column { title: "Note", hint, width: 40.0 });
+    columns
 }
 
 /// Which candidates a table lists.
@@ -135,33 +158,48 @@ pub fn push_rows(decision: &Decision, listed: Listed, selected: Option<usize>) -
         order.retain(|at| candidates[*at].rejection.is_none());
         order.truncate(LISTED);
     }
+    let columns = numbers(decision);
+    let several = candidates.iter().any(|candidate| candidate.manipulation.kind() != candidates[0].manipulation.kind());
     let row = |at: usize| {
         let candidate = &candidates[at];
-        let push = &candidate.push;
+        let told = candidate.manipulation.describe();
+        let skill = words::capital(candidate.manipulation.kind().name());
         let (note, hint) = match &candidate.rejection {
             _ if pushed == Some(at) => ("chosen".to_owned(), String::new()),
             _ if decision.best_push == Some(at) => ("best".to_owned(), String::new()),
-            Some(rejection) => ("rejected".to_owned(), words::capital(&rejection.to_string())),
+            Some(rejection) => ("rejected".to_owned(), words::capital(&candidate.manipulation.against(rejection))),
             None => (String::new(), String::new()),
         };
-        let place = format!("From x {}, y {} m", words::metres(push.start[0]), words::metres(push.start[1]));
+        let place = told
+            .facts
+            .first()
+            .map_or_else(String::new, |fact| words::capital(&format!("{} {}", fact.name, fact.text.replace('-', "−"))));
         let view = candidate.view.map_or_else(String::new, |view| format!("; best seen from view {}", view.0));
         let name = match (&candidate.rejection, decision.value_of(candidate)) {
-            (Some(rejection), _) => format!("Push {at}, rejected: {}", rejection),
-            (None, Some(value)) => format!("Push {at}, value {}", words::nats(value)),
-            (None, None) => format!("Push {at}, not weighed"),
+            (Some(rejection), _) => {
+                format!("{skill} {at}, rejected: {}", candidate.manipulation.against(rejection))
+            }
+            (None, Some(value)) => format!("{skill} {at}, value {}", words::nats(value)),
+            (None, None) => format!("{skill} {at}, not weighed"),
         };
+        let mut cells = vec![
+            Cell::number(at),
+            Cell::nats(decision.value_of(candidate)),
+            Cell::nats(candidate.gain),
+            Cell::nats(decision.disturbance_of(candidate)),
+        ];
+        cells.extend(columns.iter().map(|(title, _)| {
+            match told.parameters.iter().find(|parameter| parameter.column == Some(*title)) {
+                Some(parameter) => Cell::Figure(f64::from(parameter.value), figure(parameter)),
+                None => Cell::Word(String::new()),
+            }
+        }));
+        // Where there are several skills, the note says which one it is.
+        let note = if several { format!("{} {note}", candidate.manipulation.kind().name()) } else { note };
+        cells.push(Cell::Word(note.trim_end().to_owned()));
         Row {
             key: at,
-            cells: vec![
-                Cell::number(at),
-                Cell::nats(decision.value_of(candidate)),
-                Cell::nats(candidate.gain),
-                Cell::nats(decision.disturbance_of(candidate)),
-                Cell::Figure(f64::from(push.direction_deg), format!("{:.0}°", push.direction_deg).replace('-', "−")),
-                Cell::Figure(f64::from(push.length_m), format!("{:.0}", push.length_m * 1e3)),
-                Cell::Word(note),
-            ],
+            cells,
             chosen: pushed == Some(at),
             selected: selected == Some(at),
             grey: candidate.rejection.is_some(),
@@ -172,10 +210,42 @@ pub fn push_rows(decision: &Decision, listed: Listed, selected: Option<usize>) -
     order.into_iter().map(row).collect()
 }
 
+/// A number as it stands in a table: degrees have their sign, lengths none.
+fn figure(parameter: &Parameter) -> String {
+    let sign = if parameter.unit == Unit::Degrees { parameter.sign() } else { "" };
+    (parameter.number() + sign).replace('-', "−")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::workbench::fixture;
+    use nudge_core::plan::CandidateRecord;
+    use nudge_core::skill::Manipulation;
+
+    #[test]
+    fn candidates_of_two_skills_share_a_table_and_say_which_they_are() {
+        let mut decision = fixture::session(1).moments[4].decision().expect("step 4").clone();
+        let candidate = |json: &str| CandidateRecord {
+            gain: Some(1.0),
+            ..CandidateRecord::of(serde_json::from_str::<Manipulation>(json).expect("a manipulation"))
+        };
+        decision.candidates = vec![
+            candidate(r#"{"kind": "push", "start": [0, 0.1, 0.06], "direction_deg": 90, "length_m": 0.1}"#),
+            candidate(
+                r#"{"kind": "drag", "start": [0, 0.2, 0.05], "direction_deg": -90, "length_m": 0.08, "pitch_deg": 45}"#,
+            ),
+        ];
+        decision.best_push = Some(0);
+        let titles: Vec<&str> = push_columns(&decision).iter().map(|column| column.title).collect();
+        assert_eq!(titles, ["Push", "Value", "Gain", "γ·Reg", "To", "mm", "Down", "Note"]);
+        let rows = push_rows(&decision, Listed::All, None);
+        assert!(rows.iter().all(|row| row.cells.len() == titles.len()));
+        assert!(rows[0].name.starts_with("Push 0, value") && rows[1].name.starts_with("Drag 1, value"));
+        // With pushes alone the table is as it was.
+        decision.candidates.truncate(1);
+        assert_eq!(push_columns(&decision).len(), 7);
+    }
 
     #[test]
     fn the_best_push_stands_on_top_of_the_table_though_another_one_has_a_larger_value() {

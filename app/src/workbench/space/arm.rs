@@ -19,7 +19,7 @@ impl Painter {
         }
         let joints = match (outcome, motion) {
             (Some(outcome), Some(motion)) => {
-                let pushes = matches!(outcome.record.action, Action::Push(_));
+                let pushes = matches!(outcome.record.action, Action::Manipulate(_));
                 let rests_s = || robot::shown_at_s(arm, motion, &outcome.record.decision, pushes);
                 motion.at(space.motion_s.unwrap_or_else(rests_s))
             }

@@ -16,6 +16,8 @@ pub const CURRENT: &str = "camera/current";
 pub const CANDIDATES: &str = "push/candidates";
 /// The push that was done or is looked at.
 pub const CHOSEN: &str = "push/chosen";
+/// How the tool stands at the beginning of it, where its skill tells.
+pub const LINES: &str = "push/lines";
 /// What it sweeps.
 pub const SWEPT: &str = "push/swept";
 /// The belief that it is predicted to leave.

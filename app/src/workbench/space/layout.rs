@@ -41,7 +41,17 @@ pub(super) fn of(
         LayoutKind::Episode | LayoutKind::Why => view(
             "Belief",
             &[
-                &[at::BELIEF, at::OBJECTS, at::VIEWS, at::CURRENT, at::CANDIDATES, at::CHOSEN, at::ARM, at::ARM_PATH],
+                &[
+                    at::BELIEF,
+                    at::OBJECTS,
+                    at::VIEWS,
+                    at::CURRENT,
+                    at::CANDIDATES,
+                    at::CHOSEN,
+                    at::LINES,
+                    at::ARM,
+                    at::ARM_PATH,
+                ],
                 &pointer[..],
             ]
             .concat(),
@@ -59,20 +69,28 @@ pub(super) fn of(
                         view(
                             "Now",
                             &[
-                                &[at::BELIEF, at::OBJECTS, at::CANDIDATES, at::CHOSEN, at::ARM, at::ARM_PATH],
+                                &[
+                                    at::BELIEF,
+                                    at::OBJECTS,
+                                    at::CANDIDATES,
+                                    at::CHOSEN,
+                                    at::LINES,
+                                    at::ARM,
+                                    at::ARM_PATH,
+                                ],
                                 &pointer[..],
                             ]
                             .concat(),
                         ),
                     ),
-                    (1.0, view("Predicted", &[at::PREDICTED, at::SWEPT, at::CHOSEN])),
+                    (1.0, view("Predicted", &[at::PREDICTED, at::SWEPT, at::CHOSEN, at::LINES])),
                 ]),
             ),
             (
                 1.0,
                 Part::Row(vec![
-                    (1.0, view("Difference", &[at::DIFFERENCE, at::CHOSEN, at::PICKED])),
-                    (1.0, view("What happened", &[at::HAPPENED, at::HAPPENED_NOTE, at::CHOSEN])),
+                    (1.0, view("Difference", &[at::DIFFERENCE, at::CHOSEN, at::LINES, at::PICKED])),
+                    (1.0, view("What happened", &[at::HAPPENED, at::HAPPENED_NOTE, at::CHOSEN, at::LINES])),
                 ]),
             ),
         ]),
@@ -80,7 +98,7 @@ pub(super) fn of(
             // Three in a row where that leaves each at least as wide as high, else the difference below the two.
             let is_row = aspect >= 3.0;
             let [of_two, of_difference] = if is_row { [aspect / 3.0; 2] } else { [aspect, 2.0 * aspect] };
-            let a = view_of(of_two, "A", &[at::BELIEF, at::OBJECTS, at::CHOSEN, at::PICKED]);
+            let a = view_of(of_two, "A", &[at::BELIEF, at::OBJECTS, at::CHOSEN, at::LINES, at::PICKED]);
             let b = view_of(of_two, "B", &[at::OTHER, at::OTHER_OBJECTS]);
             let difference = view_of(of_difference, "A - B", &[at::BETWEEN, at::OBJECTS, at::PICKED]);
             match is_row {

@@ -7,9 +7,9 @@ use crate::record::shapes;
 use crate::record::voxels::{colored, surface};
 use crate::workbench::model::{ColourBy, Display, LayoutKind};
 use crate::workbench::session::Moment;
-use nudge_core::arm::Push;
 use nudge_core::plan::Action;
 use nudge_core::scene::ClassId;
+use nudge_core::skill::Manipulation;
 use nudge_core::world::TruthMap;
 use std::sync::Arc;
 
@@ -24,9 +24,10 @@ impl Painter {
         let chosen = looked_at(side, space).or_else(|| push_of(&side.moment));
         if self.differs(at::CHOSEN, format!("{:?} {chosen:?}", side.id)) {
             match chosen {
-                Some(push) => self.log(at::CHOSEN, &shapes::chosen_push(&push)),
+                Some(chosen) => self.log(at::CHOSEN, &shapes::chosen(&chosen)),
                 None => self.log(at::CHOSEN, &no_arrows()),
             }
+            self.log(at::LINES, &shapes::chosen_lines(chosen.as_ref()));
         }
     }
 
@@ -35,7 +36,7 @@ impl Painter {
     pub(super) fn push_views(&mut self, side: &Side, space: &Space) {
         let looked_at = looked_at(side, space);
         let asked = space.preview.as_ref().filter(|preview| preview.of == side.key());
-        let asked = asked.filter(|preview| looked_at.is_none_or(|push| push == preview.push));
+        let asked = asked.filter(|preview| looked_at.is_none_or(|looked_at| looked_at == preview.manipulation));
         let led_here = side
             .moment
             .outcome
@@ -43,9 +44,12 @@ impl Painter {
             .filter(|outcome| asked.is_none() && looked_at.is_none() && outcome.prediction.is_some());
         let now = self.full(side.key(), &side.moment.belief);
         let grid = now.grid;
-        if self.differs(at::PREDICTED, format!("{:?} {looked_at:?} {:?}", side.key(), asked.map(|asked| asked.push))) {
+        if self.differs(
+            at::PREDICTED,
+            format!("{:?} {looked_at:?} {:?}", side.key(), asked.map(|asked| asked.manipulation)),
+        ) {
             let swept = asked.map(|preview| &*preview.swept);
-            let swept = swept.or_else(|| led_here.and_then(|outcome| outcome.swept.as_ref()).map(|swept| &swept.swept));
+            let swept = swept.or_else(|| led_here.and_then(|outcome| outcome.swept.as_ref()).map(|told| &told.swept));
             let swept = swept.map_or_else(Vec::new, |swept| {
                 let mut inside = vec![false; grid.voxel_count()];
                 swept.iter().for_each(|index| inside[index] = true);
@@ -103,23 +107,23 @@ fn candidates(side: &Side) -> rerun::Arrows3D {
     side.decision.as_ref().map_or_else(no_arrows, |decision| shapes::candidates(decision))
 }
 
-/// The push that a moment's step did.
-fn push_of(moment: &Moment) -> Option<Push> {
+/// The manipulation that a moment's step did.
+fn push_of(moment: &Moment) -> Option<Manipulation> {
     match moment.outcome.as_ref()?.record.action {
-        Action::Push(push) => Some(push),
+        Action::Manipulate(manipulation) => Some(manipulation),
         Action::Look { .. } => None,
     }
 }
 
 /// The candidate that is looked at.
-fn looked_at(side: &Side, space: &Space) -> Option<Push> {
+fn looked_at(side: &Side, space: &Space) -> Option<Manipulation> {
     let at = space.candidate.filter(|_| space.layout == LayoutKind::Push)?;
-    side.decision.as_ref()?.candidates.get(at).map(|candidate| candidate.push)
+    side.decision.as_ref()?.candidates.get(at).map(|candidate| candidate.manipulation)
 }
 
 /// The state that a push really left: of the one that is looked at if it was done, of the one that led here if none is
 /// looked at, else of the one that was done next.
-fn happened(side: &Side, looked_at: Option<Push>) -> Option<&Arc<Moment>> {
+fn happened(side: &Side, looked_at: Option<Manipulation>) -> Option<&Arc<Moment>> {
     let after = side.after.as_ref();
     match looked_at {
         Some(push) => after.filter(|after| push_of(after) == Some(push)),
@@ -131,7 +135,7 @@ fn happened(side: &Side, looked_at: Option<Push>) -> Option<&Arc<Moment>> {
 }
 
 /// Why there is nothing to show of what happened.
-fn note(side: &Side, looked_at: Option<Push>) -> &'static str {
+fn note(side: &Side, looked_at: Option<Manipulation>) -> &'static str {
     match (looked_at, &side.after) {
         (Some(_), Some(_)) => "This push was not done",
         (Some(_), None) => "This push is not done yet",
@@ -170,7 +174,11 @@ mod tests {
         let side = Side::of(&session, 3);
         let done = push_of(&session.moments[4]).expect("step 4 is a push");
         let candidates = &side.decision.as_ref().expect("weighed").candidates;
-        let other = candidates.iter().map(|candidate| candidate.push).find(|push| *push != done).expect("another one");
+        let other = candidates
+            .iter()
+            .map(|candidate| candidate.manipulation)
+            .find(|other| *other != done)
+            .expect("another one");
         assert!(happened(&side, Some(other)).is_none());
         assert_eq!(note(&side, Some(other)), "This push was not done");
         assert_eq!(happened(&side, Some(done)).map(|moment| moment.step), Some(4));

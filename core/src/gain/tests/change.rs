@@ -2,14 +2,14 @@
 
 use super::super::*;
 use super::support::{patchy, small_grid, standard};
-use crate::belief::{Belief, PushPrediction};
+use crate::belief::{Belief, Prediction};
 use crate::grid::Window;
 use crate::rng::stream;
 use proptest::prelude::*;
 use rand::Rng;
 
 /// A random window of another belief over the same grid.
-fn prediction(grid: &Grid, seed: u64) -> PushPrediction {
+fn prediction(grid: &Grid, seed: u64) -> Prediction {
     let mut rng = stream(seed, "window", 0);
     let other = patchy(*grid, seed + 1_000_000);
     let mut range = |n: usize| {
@@ -18,7 +18,7 @@ fn prediction(grid: &Grid, seed: u64) -> PushPrediction {
     };
     let window = Window { x: range(grid.dims[0]), y: range(grid.dims[1]) };
     let cells: Vec<usize> = window.cells(grid).collect();
-    PushPrediction {
+    Prediction {
         window,
         occupancy: cells.iter().flat_map(|&cell| other.occupancy[grid.column(cell)].to_vec()).collect(),
         semantics: cells.iter().map(|&cell| other.semantics[cell]).collect(),
@@ -26,7 +26,7 @@ fn prediction(grid: &Grid, seed: u64) -> PushPrediction {
     }
 }
 
-fn after(belief: &Belief, prediction: &PushPrediction) -> Belief {
+fn after(belief: &Belief, prediction: &Prediction) -> Belief {
     let mut belief = belief.clone();
     belief.apply(prediction);
     belief

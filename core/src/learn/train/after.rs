@@ -7,7 +7,7 @@
 use super::batch::Batch;
 use super::kept::Kept;
 use crate::Result;
-use crate::belief::{BeliefUpdate, SweptPush};
+use crate::belief::BeliefUpdate;
 use crate::cnabu::{Cnabu, Evidence, Layout, Mirror};
 use crate::learn::evaluate::after_views;
 use crate::learn::{Dataset, MapSample, PushSample};
@@ -62,8 +62,9 @@ impl AfterPushes {
 /// What is believed of a sample after its views and the prediction of its first push.
 fn believed(layout: &Layout, sample: &PushSample, update: &Cnabu) -> Evidence {
     let (mut belief, _) = after_views(update, layout.grid(), &sample.views);
-    let first: Vec<SweptPush> = sample.pushes.iter().take(1).map(|pushed| pushed.push.clone()).collect();
-    for prediction in update.predict_pushes(&belief, &first) {
+    let mut first = sample.interventions(&belief);
+    first.truncate(1);
+    for prediction in update.predict(&belief, &first) {
         belief.apply(&prediction);
     }
     update.planes_of(layout, &belief)

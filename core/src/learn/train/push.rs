@@ -7,12 +7,12 @@
 use super::Trainer;
 use super::kept::Kept;
 use crate::Result;
-use crate::belief::{Carried, FloorPlan, SOLID};
+use crate::belief::{Moved, Stroke};
 use crate::cnabu::{
     Cnabu, Evidence, Layout, LossForm, Mirror, Numbers, PriorParts, PushNet, PushPlanes, Pushed, SUBS, WINDOW,
     Windowed, belief_of, observation_planes, occupancy_loss, push_planes, semantics_loss, windows,
 };
-use crate::learn::{Dataset, PushSample, PushedSample};
+use crate::learn::{Dataset, PushSample};
 use crate::rng::stream;
 use crate::scene::CLASS_COUNT;
 use rand::Rng;
@@ -135,7 +135,7 @@ impl PushTrainer {
 #[derive(Debug)]
 struct Prior {
     evidence: Evidence,
-    carried: Arc<[Option<Carried>]>,
+    moved: Arc<[Moved]>,
 }
 
 impl Prior {
@@ -148,14 +148,14 @@ impl Prior {
         }
         let evidence = evidence.to_kind(Kind::Half);
         let belief = belief_of(layout, &evidence.to_kind(Kind::Float));
-        let plan = FloorPlan::new(&belief, SOLID);
-        let carried = sample.pushes.iter().map(|pushed| Carried::by(&pushed.push, &belief, &plan)).collect();
-        Self { evidence, carried }
+        let interventions = sample.interventions(&belief);
+        let moved = interventions.iter().map(|intervention| intervention.flow.moved(layout.grid())).collect();
+        Self { evidence, moved }
     }
 
     /// The same with evidence of 32 bits: rounded, so that a run that is resumed is the run that was not stopped.
     fn single(&self) -> Self {
-        Self { evidence: self.evidence.to_kind(Kind::Float), carried: Arc::clone(&self.carried) }
+        Self { evidence: self.evidence.to_kind(Kind::Float), moved: Arc::clone(&self.moved) }
     }
 }
 
@@ -212,18 +212,19 @@ impl Scene {
             },
         };
         let y = layout.pixels()[1] as i64;
-        let around = |pushed: &PushedSample| {
-            let x = layout.around(&pushed.push.push, WINDOW);
+        let strokes: Vec<Stroke> = sample.pushes.iter().map(|pushed| pushed.push.push.stroke()).collect();
+        let around = |stroke: &Stroke| {
+            let x = layout.around(stroke, WINDOW);
             if mirror == Mirror::X { layout.mirrored(&x) } else { x }
         };
-        let xs: Vec<Range<usize>> = sample.pushes.iter().map(around).collect();
-        let carried = prior.carried.iter().map(Option::as_ref);
+        let xs: Vec<Range<usize>> = strokes.iter().map(around).collect();
         let windowed: Vec<_> = sample
             .pushes
             .iter()
-            .zip(carried)
+            .zip(&strokes)
+            .zip(prior.moved.iter())
             .zip(&xs)
-            .map(|((pushed, carried), x)| Windowed { push: &pushed.push, carried, x: x.clone() })
+            .map(|(((pushed, stroke), moved), x)| Windowed { swept: &pushed.push.swept, stroke, moved, x: x.clone() })
             .collect();
         let pushes = push_planes(layout, &Numbers::of(&evidence), &windowed, mirror);
         let plane = xs[0].len() * layout.pixels()[1];

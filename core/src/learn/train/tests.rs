@@ -304,14 +304,14 @@ fn sigma_m_learns_what_a_push_does_and_predicts_inside_its_window() {
         belief = observe.observe(&belief, &view.observation);
     }
     let update = trainer.with(observe);
-    let pushes: Vec<_> = sample.pushes.iter().map(|pushed| pushed.push.clone()).collect();
-    for (prediction, push) in update.predict_pushes(&belief, &pushes).iter().zip(&pushes) {
+    let predictions = update.predict(&belief, &sample.interventions(&belief));
+    for (prediction, pushed) in predictions.iter().zip(&sample.pushes) {
         let window = prediction.window;
         assert_eq!(prediction.change.len(), window.cell_count());
         assert_eq!(prediction.occupancy.len(), window.cell_count() * data.grid().dims[2]);
         assert!(prediction.change.iter().all(|p| (0.0..=1.0).contains(p)));
         assert!(prediction.occupancy.as_flattened().iter().all(|a| a.is_finite() && *a >= 1.0));
-        let middle = push.push.start_point() + push.push.direction() * (0.5 * push.push.length_m);
+        let middle = pushed.push.push.start_point() + pushed.push.push.direction() * (0.5 * pushed.push.push.length_m);
         let cell = data.grid().cell_at(middle).expect("on the board");
         // 80 cells around the push, moved in from the walls.
         let first = usize::from(cell.x).clamp(40, data.grid().dims[0] - 40) - 40;

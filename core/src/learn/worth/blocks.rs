@@ -1,7 +1,7 @@
 //! Maps in blocks of voxels, a byte each.
 
 use super::state::BANDS;
-use crate::belief::{Belief, PushPrediction, beta_mean, beta_variance};
+use crate::belief::{Belief, Prediction, beta_mean, beta_variance};
 use crate::grid::{Grid, VoxelSet};
 
 /// Edge of a block, voxels.
@@ -74,7 +74,7 @@ pub(super) fn bits(grid: &Grid, set: &VoxelSet) -> Vec<u8> {
 }
 
 /// Per block of the floor, the largest probability that a push changes one of its cells, in 255ths.
-pub(super) fn change(grid: &Grid, prediction: &PushPrediction) -> Vec<u8> {
+pub(super) fn change(grid: &Grid, prediction: &Prediction) -> Vec<u8> {
     let [width, depth, _] = dims(grid);
     let mut change = vec![0; width * depth];
     for (cell, chance) in prediction.window.cells(grid).zip(&prediction.change) {
@@ -87,7 +87,7 @@ pub(super) fn change(grid: &Grid, prediction: &PushPrediction) -> Vec<u8> {
 }
 
 /// Per coarse block of the floor and height band, how the mean occupancy probability is predicted to change, in 127ths.
-pub(super) fn occupancy_change(belief: &Belief, prediction: &PushPrediction) -> Vec<i8> {
+pub(super) fn occupancy_change(belief: &Belief, prediction: &Prediction) -> Vec<i8> {
     let grid = &belief.grid;
     let [width, depth] = coarse_dims(grid);
     let height = grid.dims[2];
@@ -135,7 +135,7 @@ mod tests {
         // 8 x 4 cells of 8 levels; the window is the cell (5, 2) alone, and its lowest level is cleared for certain.
         let mut occupancy = vec![[1.0; 2]; 8];
         occupancy[0] = [0.0, 1.0];
-        let prediction = PushPrediction {
+        let prediction = Prediction {
             window: Window { x: [5, 6], y: [2, 3] },
             occupancy,
             semantics: vec![[1.0; crate::scene::CLASS_COUNT]],

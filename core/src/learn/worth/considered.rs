@@ -1,7 +1,7 @@
 //! The pushes from a state, with what is promised of each.
 
-use crate::belief::PushPrediction;
-use crate::push::{Candidate, PushSampler};
+use crate::belief::Prediction;
+use crate::skill::{Candidate, PushSampler};
 
 /// Feasible pushes from a state.
 pub(super) struct Considered {
@@ -10,7 +10,7 @@ pub(super) struct Considered {
     /// Where each was drawn.
     pub samplers: Vec<PushSampler>,
     /// What each is predicted to leave.
-    pub predictions: Vec<PushPrediction>,
+    pub predictions: Vec<Prediction>,
     /// What each promises to open, nats.
     pub gains: Vec<f32>,
     /// What each is expected to blur, nats, at most 0.

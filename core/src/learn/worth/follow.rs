@@ -4,8 +4,8 @@ use super::considered::Considered;
 use super::rollout::Rollout;
 use super::state::MapScores;
 use crate::belief::Belief;
-use crate::push::PushTruth;
 use crate::score::Scores;
+use crate::skill::PushTruth;
 use crate::world::{TruthMap, World};
 
 /// Actions that are compared: looks, or a push and looks.

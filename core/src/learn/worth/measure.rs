@@ -5,14 +5,14 @@ use super::considered::Considered;
 use super::follow;
 use super::rollout::Rollout;
 use super::state::{BeliefMap, FloorFacts, Followed, ObjectOutcome, ObjectState, Promise, WorthPush, WorthState};
-use crate::arm::PushMotion;
+use crate::arm::PhasedMotion;
 use crate::belief::{Belief, dirichlet_entropy, dirichlet_vacuity};
 use crate::gain::{RayDensity, TrueReach};
 use crate::grid::VoxelSet;
 use crate::learn::maps::occupied;
-use crate::push::{Counterfactual, PushTruth};
 use crate::rng::stream;
 use crate::scene::{Body, CLASS_COUNT};
+use crate::skill::{Candidate, Counterfactual, Manipulation, Push, PushTruth};
 use crate::world::TruthMap;
 use rand::Rng;
 
@@ -20,7 +20,7 @@ use rand::Rng;
 pub(super) fn measure(rollout: &Rollout<'_>, leg: u8, considered: &Considered, done: &(dyn Fn() + Sync)) -> WorthState {
     let (base, belief) = (&rollout.recipe.base, &rollout.belief);
     let grid = belief.grid;
-    let motions: Vec<PushMotion> = considered.pushes.iter().filter_map(|push| push.motion.clone()).collect();
+    let motions: Vec<PhasedMotion> = considered.pushes.iter().filter_map(|push| push.motion.clone()).collect();
     let known = Counterfactual::new(&rollout.world, &base.arm, &base.views, rollout.sightings.seen());
     let truths = known.of_each(&motions, done);
     let objects: Vec<ObjectState> = known
@@ -96,6 +96,14 @@ fn object(body: &Body, hidden: bool, shown: u32) -> ObjectState {
     ObjectState { id: body.id, class: body.class.0, hidden, shown, pose }
 }
 
+/// The push of a candidate: pushes alone are considered.
+fn pushed(candidate: &Candidate) -> Push {
+    match candidate.manipulation {
+        Manipulation::Push(push) => push,
+        _ => Push { start: [0.0; 3], direction_deg: 0.0, length_m: 0.0 },
+    }
+}
+
 fn push(belief: &Belief, objects: &[ObjectState], considered: &Considered, at: usize, truth: &PushTruth) -> WorthPush {
     let (candidate, prediction) = (&considered.pushes[at], &considered.predictions[at]);
     let outcome = |(object, shown): (&ObjectState, &u32)| {
@@ -104,11 +112,11 @@ fn push(belief: &Belief, objects: &[ObjectState], considered: &Considered, at: u
         ObjectOutcome { hidden: object.hidden != changes, dropped, shown: *shown }
     };
     WorthPush {
-        push: candidate.swept.push,
+        push: pushed(candidate),
         contact: candidate.contact,
         sampler: considered.samplers[at],
         motion_s: considered.motions_s[at],
-        swept: blocks::bits(&belief.grid, &candidate.swept.swept),
+        swept: blocks::bits(&belief.grid, &candidate.swept),
         promise: Promise {
             gain: considered.gains[at],
             reg: considered.regs[at],

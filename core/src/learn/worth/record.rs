@@ -4,12 +4,12 @@ use super::blocks;
 use super::state::{
     BANDS, BeliefMap, FloorFacts, Followed, MapScores, ObjectOutcome, ObjectState, Promise, WorthPush, WorthState,
 };
-use crate::arm::Push;
 use crate::grid::{Grid, Voxel};
 use crate::learn::bytes::{Reader, put_set};
 use crate::learn::{Kind, Record};
-use crate::push::PushSampler;
 use crate::scene::{CLASS_COUNT, Family, MAX_OBJECTS, ObjectId};
+use crate::skill::Push;
+use crate::skill::PushSampler;
 
 /// What a record holds, in order: name, type, shape. `u1` is a byte, `i1` one with a sign; a bit is packed lowest first.
 pub const LAYOUT: [&str; 10] = [

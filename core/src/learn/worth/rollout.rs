@@ -3,14 +3,15 @@
 use super::considered::Considered;
 use super::{STATES_PER_EPISODE, WorthRecipe};
 use crate::Result;
-use crate::belief::{Belief, Sightings, SweptPush, look};
+use crate::belief::{Belief, FloorPlan, Intervention, SOLID, Sightings, look};
 use crate::camera::{HiddenWatch, NoiseModel, View, ViewId, project, render};
 use crate::gain::{Openings, RayDensity, ViewPair};
 use crate::learn::Recipe;
 use crate::plan::{Counted, Gain, coarse, disturbance};
-use crate::push::{Candidate, PushSampler, sample};
 use crate::rng::{derived_seed, stream};
 use crate::scene::{Family, GenerateConfig};
+use crate::skill::Candidate;
+use crate::skill::push::{PushSampler, sample};
 use crate::world::World;
 use rand::Rng;
 use std::cell::OnceCell;
@@ -163,8 +164,10 @@ impl<'a> Rollout<'a> {
             pushes.extend(feasible);
             samplers.resize(pushes.len(), sampler);
         }
-        let swept: Vec<_> = pushes.iter().map(|candidate: &Candidate| candidate.swept.clone()).collect();
-        let predictions = self.recipe.update.predict_pushes(belief, &swept);
+        let solid = FloorPlan::new(belief, SOLID);
+        let told = |push: &Candidate| push.manipulation.skill().intervention(belief, &solid, push.swept.clone());
+        let interventions: Vec<Intervention> = pushes.iter().map(told).collect();
+        let predictions = self.recipe.update.predict(belief, &interventions);
         let gain = Gain::new(Counted::Unseen, belief, seen);
         let openings = Openings::new(gain.field(), &base.views, &coarse(&self.offered()), RayDensity::COARSE);
         let gains = openings.under_each(&predictions);
@@ -234,8 +237,8 @@ impl<'a> Rollout<'a> {
         self.used.clear();
         self.best = OnceCell::new();
         self.dropped |= !outcome.dropped.is_empty();
-        let swept = SweptPush::done(&considered.pushes[at].swept.push, &outcome, arm, &self.belief.grid);
-        let predicted = self.recipe.update.predict_pushes(&self.belief, std::slice::from_ref(&swept));
+        let swept = considered.pushes[at].manipulation.done(&outcome, arm, &self.belief.grid);
+        let predicted = self.recipe.update.predict(&self.belief, &[swept.intervention(&self.belief)]);
         for prediction in predicted {
             self.belief.apply(&prediction);
             self.sightings.forget_changed(&prediction);

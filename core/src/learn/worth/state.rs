@@ -1,9 +1,9 @@
 //! A state of an episode and the pushes from it, as they are filed.
 
-use crate::arm::Push;
 use crate::grid::{Voxel, VoxelSet};
-use crate::push::PushSampler;
 use crate::scene::{Family, ObjectId};
+use crate::skill::Push;
+use crate::skill::PushSampler;
 
 /// Height bands of a predicted change.
 pub const BANDS: usize = 8;

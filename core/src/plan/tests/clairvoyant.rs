@@ -15,7 +15,7 @@ fn the_clairvoyant_pushes_what_really_wins_objects_and_of_equals_what_opens_most
     let decision = decide(&table);
     let at = nth_feasible(&decision, 3);
     assert_eq!((decision.best_push, decision.reason), (Some(at), Reason::PushReveals));
-    assert_eq!(decision.action, Action::Push(decision.candidates[at].push));
+    assert_eq!(decision.action, Action::Manipulate(decision.candidates[at].manipulation));
     assert!(decision.motion.is_some() && (decision.igm - 4.0 * std::f32::consts::LN_2).abs() < 1e-5);
     assert!(decision.comparison().term(TermKind::Push).is_some_and(|term| term.words.contains("really opens")));
     // What the planner promised of each is kept, and is that of `mem`.
@@ -45,7 +45,7 @@ fn the_clairvoyant_pushes_what_really_wins_objects_and_of_equals_what_opens_most
     assert_eq!(decide(&early).reason, Reason::TooEarly);
     table.really = vec![[1, 0, 1]; 6];
     table.settings = table.settings.counting(Counted::Unseen);
-    table.history.actions.extend([Action::Push(push()), Action::Look { view: ViewId(0) }]);
+    table.history.actions.extend([Action::Manipulate(push().into()), Action::Look { view: ViewId(0) }]);
     assert_eq!(decide(&table).reason, Reason::JustPushed);
     table.belief = Belief::uniform(table.belief.grid);
     table.history.actions = vec![Action::Look { view: ViewId(0) }; 6];

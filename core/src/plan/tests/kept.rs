@@ -12,14 +12,18 @@ fn a_history_takes_down_what_was_done() {
     assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
 
     let candidate = CandidateRecord { gain: Some(1.0), view: Some(ViewId(3)), ..CandidateRecord::of(push()) };
-    let pushed =
-        Decision { action: Action::Push(push()), candidates: vec![candidate], best_push: Some(0), ..look.clone() };
+    let pushed = Decision {
+        action: Action::Manipulate(push().into()),
+        candidates: vec![candidate],
+        best_push: Some(0),
+        ..look.clone()
+    };
     history.record(&pushed, false);
     assert!(history.just_pushed() && history.used_views.is_empty());
     assert_eq!((history.view_of_push, history.best_gains.len()), (Some(ViewId(3)), 1));
     // A push by hand is not the one that was weighed; after a drop there is nothing to look at.
     let by_hand = Push { length_m: 0.07, ..push() };
-    history.record(&Decision { action: Action::Push(by_hand), ..pushed.clone() }, false);
+    history.record(&Decision { action: Action::Manipulate(by_hand.into()), ..pushed.clone() }, false);
     assert_eq!((history.view_of_push, history.dropped), (None, false));
     history.record(&pushed, true);
     assert_eq!((history.view_of_push, history.dropped), (None, true));

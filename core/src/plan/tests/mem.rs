@@ -42,7 +42,7 @@ fn mem_weighs_no_push_where_none_is_allowed() {
     complete.belief.semantics.iter_mut().for_each(|a| a[14] += 200.0);
     check(&complete, Reason::MapComplete);
     let mut pushed = Table::after_looks(6);
-    pushed.history.actions.push(Action::Push(push()));
+    pushed.history.actions.push(Action::Manipulate(push().into()));
     check(&pushed, Reason::JustPushed);
 }
 
@@ -54,7 +54,7 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
     assert_eq!(decision.reason, Reason::PushTellsMore);
     assert!(is_push(&decision) && decision.igm > decision.igv);
     let best = &decision.candidates[decision.best_push.expect("a best push")];
-    assert_eq!(decision.action, Action::Push(best.push));
+    assert_eq!(decision.action, Action::Manipulate(best.manipulation));
     assert_eq!((best.gain, best.reg), (Some(decision.igm), Some(decision.reg)));
 
     // The winner is scored in full: all views, all rays.

@@ -1,8 +1,8 @@
-//! A push by the arm: its links follow the motion as kinematic bodies, and the objects that they touch are recorded.
+//! A manipulation by the arm: its links follow the motion as kinematic bodies, and the objects that they touch are recorded.
 
 use super::physics::{BLOCKING_FORCE_N, TIME_STEP_S};
-use super::{PushOutcome, World};
-use crate::arm::{Arm, Joints, Motion, PushMotion};
+use super::{ManipulationOutcome, World};
+use crate::arm::{Arm, Joints, Motion, PhaseKind, PhasedMotion};
 use crate::scene::{Body, ObjectId};
 use serde::{Deserialize, Serialize};
 
@@ -24,36 +24,40 @@ struct Ride {
 }
 
 impl World {
-    /// Carries out a push by the arm: in, along the push, back the same way; then the bodies settle.
+    /// Carries out a motion of the arm, phase by phase, and back: as planned, or the same way; then the bodies settle.
     ///
-    /// An arm that is blocked stops there, goes back and reports a stall. It is planned clear of the shelf and does not
-    /// feel it; how deep it got into a panel is in the outcome all the same.
-    pub fn execute(&mut self, arm: &Arm, motion: &PushMotion) -> PushOutcome {
+    /// An arm that is blocked stops there, goes back the way it came and reports a stall. It is planned clear of the shelf
+    /// and does not feel it; how deep it got into a panel is in the outcome all the same.
+    pub fn execute(&mut self, arm: &Arm, motion: &PhasedMotion) -> ManipulationOutcome {
         let before = self.poses();
         let dropped_before = self.dropped.clone();
         self.physics.begin();
         let steps_before = self.physics.steps();
         let mut notes = Notes::default();
-        let Some(first) = motion.way_in.at(0.0) else { return self.outcome(&before, &dropped_before, steps_before) };
+        let Some(first) = motion.start() else { return self.outcome(&before, &dropped_before, steps_before) };
         self.physics.insert_arm(arm, &first);
-        let start = motion.push.at(0.0).unwrap_or(first);
 
-        let way_in = self.ride(arm, &motion.way_in, &mut notes);
-        let (mut stalled, mut pushed_m) = (way_in.blocked_s.is_some(), 0.0);
-        let mut last = way_in.joints;
-        let mut back: Vec<Joints> = before_time(&motion.way_in, way_in.blocked_s);
-        if !stalled {
-            let along = self.ride(arm, &motion.push, &mut notes);
-            stalled = along.blocked_s.is_some();
-            last = along.joints;
-            let tip = |joints: &Joints| arm.world_from_tool(joints).translation.vector;
-            pushed_m = (tip(&last) - tip(&start)).norm() as f32;
-            back.extend(before_time(&motion.push, along.blocked_s));
+        let tip = |joints: &Joints| arm.world_from_tool(joints).translation.vector;
+        let (mut stalled, mut way_m, mut last) = (false, 0.0, first);
+        let mut back: Vec<Joints> = Vec::new();
+        for phase in motion.outward() {
+            let start = phase.motion.at(0.0).unwrap_or(last);
+            let ride = self.ride(arm, &phase.motion, &mut notes);
+            last = ride.joints;
+            back.extend(before_time(&phase.motion, ride.blocked_s));
+            if phase.kind == PhaseKind::Contact {
+                way_m += (tip(&last) - tip(&start)).norm() as f32;
+            }
+            if ride.blocked_s.is_some() {
+                stalled = true;
+                break;
+            }
         }
         back.push(last);
         let passed = back.clone();
         back.reverse();
-        let way_back = Motion::along(arm, &back, crate::arm::WAY_BACK_M_S);
+        let planned = motion.retreat().filter(|_| !stalled);
+        let way_back = planned.unwrap_or_else(|| Motion::along(arm, &back, crate::arm::WAY_BACK_M_S));
         // An arm that cannot even go back is taken away where it is: a real one would give way.
         self.ride(arm, &way_back, &mut notes);
         self.physics.remove_arm();
@@ -62,7 +66,7 @@ impl World {
 
         let mut outcome = self.outcome(&before, &dropped_before, steps_before);
         outcome.stalled = stalled;
-        outcome.pushed_m = pushed_m;
+        outcome.way_m = way_m;
         outcome.link_contacts = notes.contacts;
         outcome.against_wall = notes.against_wall;
         outcome.arm_in_shelf_m = notes.arm_in_shelf_m;
@@ -71,14 +75,14 @@ impl World {
         outcome
     }
 
-    /// What happened since `before`, for an arm that has not pushed yet.
-    fn outcome(&self, before: &[crate::Pose], dropped_before: &[bool], steps_before: u64) -> PushOutcome {
+    /// What happened since `before`, for an arm that has not moved yet.
+    fn outcome(&self, before: &[crate::Pose], dropped_before: &[bool], steps_before: u64) -> ManipulationOutcome {
         let ids = self.bodies.iter().zip(self.dropped.iter().zip(dropped_before));
-        PushOutcome {
+        ManipulationOutcome {
             displacement_m: self.displacements(before),
             dropped: ids.filter(|(_, (now, before))| **now && !**before).map(|(body, _)| body.id).collect(),
             duration_s: (self.physics.steps() - steps_before) as f32 * TIME_STEP_S,
-            ..PushOutcome::default()
+            ..ManipulationOutcome::default()
         }
     }
 

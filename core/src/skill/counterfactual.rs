@@ -12,7 +12,7 @@
 //! A push moves few objects. So only what they were before, what they come before, and they themselves are looked at again
 //! ([`HiddenWatch`], [`TrueReach::after`]); the result is the same as that of looking at everything.
 
-use crate::arm::{ArmTool, PushMotion};
+use crate::arm::{ArmTool, PhasedMotion};
 use crate::belief::{Belief, bernoulli_entropy, beta_mean};
 use crate::camera::{HiddenWatch, ViewArray};
 use crate::gain::{RayDensity, TrueReach};
@@ -116,7 +116,7 @@ impl<'a> Counterfactual<'a> {
     }
 
     /// Carries out a push in a copy of the world. The world itself stays as it is.
-    pub fn of(&self, motion: &PushMotion) -> PushTruth {
+    pub fn of(&self, motion: &PhasedMotion) -> PushTruth {
         let mut world = self.world.clone();
         let outcome = world.execute(&self.arm.arm, motion);
         let after = world.bodies();
@@ -125,7 +125,7 @@ impl<'a> Counterfactual<'a> {
             lost: Vec::new(),
             opened: VoxelSet::empty(&self.grid),
             displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
-            pushed_m: outcome.pushed_m,
+            pushed_m: outcome.way_m,
             jammed: outcome.stalled,
             dropped: outcome.dropped,
             toppled: Vec::new(),
@@ -162,8 +162,8 @@ impl<'a> Counterfactual<'a> {
 
     /// Carries out each of some pushes, in parallel; `done` is called after each, from any thread. The result does not depend
     /// on the number of threads.
-    pub fn of_each(&self, motions: &[PushMotion], done: &(dyn Fn() + Sync)) -> Vec<PushTruth> {
-        let carried_out = |motion: &PushMotion| {
+    pub fn of_each(&self, motions: &[PhasedMotion], done: &(dyn Fn() + Sync)) -> Vec<PushTruth> {
+        let carried_out = |motion: &PhasedMotion| {
             let truth = self.of(motion);
             done();
             truth
@@ -190,10 +190,9 @@ fn stands(world_from_body: &Pose) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arm::Push;
-    use crate::push::ArmClearance;
     use crate::rng::stream;
     use crate::scene::{ClassId, Shelf};
+    use crate::skill::{ArmClearance, Push, Skill};
     use crate::solid::Solid;
     use std::sync::Arc;
 
@@ -217,10 +216,10 @@ mod tests {
         world
     }
 
-    fn motion(arm: &ArmTool, push: &Push) -> PushMotion {
+    fn motion(arm: &ArmTool, push: &Push) -> PhasedMotion {
         let belief = Belief::uniform(arm.shelf.grid());
         let clearance = ArmClearance::new(arm, &belief);
-        let motion = clearance.motion(push, &clearance.target_of(push), &mut stream(1, "test pushes", 0));
+        let motion = push.plan(&clearance, &mut stream(1, "test pushes", 0));
         motion.expect("within reach")
     }
 

@@ -1,4 +1,4 @@
-//! A classical prediction of what a push leaves behind.
+//! A classical prediction of what a manipulation leaves behind.
 //!
 //! Nothing is simulated. The prediction makes four assumptions, all inside a window around the swept volume:
 //!
@@ -7,15 +7,14 @@
 //!   too where the tool passed lower than any object is high ([`SHORTEST_M`]), or where it touched something, which has
 //!   then left. What is lower than a link that passed above it stays. The reported change of a swept cell is the
 //!   largest occupancy probability in the swept part of its column.
-//! * **The first object that the tool touches moves with it.** Its patch of the floor plan ([`FloorPlan::patch`]) is
-//!   shifted along the push for the rest of the push after the contact, at most up to the walls. Where it stood is
-//!   free. Its evidence moves along, halved in log-odds (it may turn or slip off), and so do its labels.
-//! * **Evidence of objects near the push decays to the prior**, because a moving object pushes others. The probability
+//! * **What is expected to move goes where it is expected to go** ([`Flow`](crate::belief::Flow)): of a push the first object
+//!   that the tool touches, shifted along for the rest of the push. Where it stood is free. Its evidence moves along, halved in log-odds (it may turn or slip off), and so do its labels.
+//! * **Evidence of objects near the tool's stroke decays to the prior**, because a moving object pushes others. The probability
 //!   of change is 1 within [`NEAR_M`] of the tip's track, falls linearly to 0 at [`FAR_M`], and is scaled by the
 //!   probability that the tool touches anything. The track is extended by [`AHEAD_M`] beyond its end, because that is
-//!   where objects go. Cells behind the start keep their evidence: nothing moves against a push.
-//! * **Known free space stays free** unless the moved object comes to stand there. If it decayed as well, every push
-//!   would promise a large gain for looking again at what was only forgotten: a ray through many voxels of small `p`
+//!   where objects go. Cells behind the start keep their evidence: nothing moves against the tool.
+//! * **Known free space stays free** unless the moved object comes to stand there. If it decayed as well, every
+//!   manipulation would promise a large gain for looking again at what was only forgotten: a ray through many voxels of small `p`
 //!   gains up to `H(p) / p` nats, 4 at `p = 0.05` but 1.4 in truly unknown space.
 //!
 //! The posterior is gated with the probability of change: `lambda' = (1 - p) lambda + p lambda_predicted`; swept
@@ -23,8 +22,8 @@
 
 use super::{LOG_ODDS_LIMIT, evidence, log_odds};
 use crate::Point;
-use crate::belief::carried::{Carried, Met, Track};
-use crate::belief::{Belief, FloorPlan, PushPrediction, SweptPush, beta_mean};
+use crate::belief::intervention::{Met, Moved};
+use crate::belief::{Belief, FloorPlan, Intervention, Prediction, Stroke, beta_mean};
 use crate::grid::Window;
 use crate::scene::{BACKGROUND, CLASS_COUNT};
 
@@ -32,27 +31,26 @@ use crate::scene::{BACKGROUND, CLASS_COUNT};
 pub const NEAR_M: f32 = 0.03;
 /// Distance from the tip's track from which nothing changes, metres.
 pub const FAR_M: f32 = 0.09;
-/// How far the track is extended beyond the end of the push, metres: about the depth of what is pushed.
+/// How far the track is extended beyond the end of the stroke, metres: about the depth of what is pushed.
 pub const AHEAD_M: f32 = 0.06;
 /// Lower than any object is high, metres: what passes here passes through the whole column.
 pub const SHORTEST_M: f32 = 0.06;
 /// Evidence for free space where an object has left, strong enough to outweigh the old evidence in the gate.
 const GONE: f32 = 100.0;
 
-/// The belief that a push is predicted to leave. `plan` holds the occupied floor cells
+/// The belief that a manipulation is predicted to leave. `plan` holds the occupied floor cells
 /// ([`SOLID`](crate::belief::SOLID)).
-pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> PushPrediction {
+pub(super) fn predict(belief: &Belief, plan: &FloorPlan, intervention: &Intervention) -> Prediction {
     let grid = &belief.grid;
     let height = grid.dims[2];
-    let met = Met::of(belief, push);
+    let (met, stroke) = (Met::of(belief, &intervention.swept), &intervention.stroke);
     let contact = met.probability.iter().copied().fold(0.0, f32::max);
-    let track = Track::of(push);
-    let carried = Carried::of(belief, plan, &met, &track);
-    let window = window(belief, &met, &track, carried.as_ref());
+    let moved = intervention.flow.moved(grid);
+    let window = window(belief, &met, stroke, &moved);
 
     let free = evidence(-LOG_ODDS_LIMIT, 1.0 + LOG_ODDS_LIMIT.exp());
     let gone = evidence(-LOG_ODDS_LIMIT, GONE);
-    let mut prediction = PushPrediction {
+    let mut prediction = Prediction {
         window,
         occupancy: Vec::with_capacity(window.cell_count() * height),
         semantics: Vec::with_capacity(window.cell_count()),
@@ -63,8 +61,7 @@ pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> Pu
     for cell in window.cells(grid) {
         let column = &belief.occupancy[grid.column(cell)];
         let before = &belief.semantics[cell];
-        let left = carried.as_ref().is_some_and(|carried| carried.stood(cell));
-        let source = carried.as_ref().and_then(|carried| carried.source(cell));
+        let (left, source) = (moved.stood(cell), moved.source(cell));
         let change;
         let labels: [f32; CLASS_COUNT];
         if met.probability[cell] >= 0.0 {
@@ -95,7 +92,7 @@ pub(super) fn predict(belief: &Belief, plan: &FloorPlan, push: &SweptPush) -> Pu
                 }
             }
         } else {
-            let near = if plan.stands(cell) { nearness(&track, grid.cell_center(grid.cell(cell))) } else { 0.0 };
+            let near = if plan.stands(cell) { nearness(stroke, grid.cell_center(grid.cell(cell))) } else { 0.0 };
             change = contact * near;
             labels = [1.0; CLASS_COUNT];
             let decayed = |a: &[f32; 2]| if beta_mean(*a) > 0.5 { gated(*a, [1.0; 2], change) } else { *a };
@@ -118,7 +115,7 @@ fn gated(before: [f32; 2], predicted: [f32; 2], p: f32) -> [f32; 2] {
 
 /// The columns that the prediction may change: swept cells, cells within [`FAR_M`] of the track, and cells that the
 /// moved object leaves or comes to.
-fn window(belief: &Belief, met: &Met, track: &Track, carried: Option<&Carried>) -> Window {
+fn window(belief: &Belief, met: &Met, stroke: &Stroke, moved: &Moved) -> Window {
     let grid = &belief.grid;
     let (mut low, mut high) = ([usize::MAX; 2], [0_usize; 2]);
     let mut include = |at: [usize; 2]| {
@@ -130,7 +127,7 @@ fn window(belief: &Belief, met: &Met, track: &Track, carried: Option<&Carried>) 
     for cell in (0..grid.cell_count()).filter(|&cell| met.probability[cell] >= 0.0) {
         include([cell / grid.dims[1], cell % grid.dims[1]]);
     }
-    for end in [track.start, track.start + track.direction * (track.length + AHEAD_M)] {
+    for end in [stroke.start, stroke.start + stroke.direction * (stroke.length_m + AHEAD_M)] {
         for reach in [-FAR_M, FAR_M] {
             let at: [usize; 2] = std::array::from_fn(|axis| {
                 let cell = ((end[axis] + reach - grid.origin[axis]) / grid.voxel_m).floor().max(0.0) as usize;
@@ -139,19 +136,17 @@ fn window(belief: &Belief, met: &Met, track: &Track, carried: Option<&Carried>) 
             include(at);
         }
     }
-    if let Some(carried) = carried {
-        carried.cells().for_each(include);
-    }
+    moved.corners().for_each(include);
     Window { x: [low[0], high[0]], y: [low[1], high[1]] }
 }
 
 /// 1 near the extended track of the tip, 0 far from it or behind its start.
-fn nearness(track: &Track, on_board: Point) -> f32 {
-    let along = track.along(on_board);
+fn nearness(stroke: &Stroke, on_board: Point) -> f32 {
+    let along = stroke.along(on_board);
     if along < 0.0 {
         return 0.0;
     }
-    let on_track = track.start + track.direction * along.min(track.length + AHEAD_M);
+    let on_track = stroke.start + stroke.direction * along.min(stroke.length_m + AHEAD_M);
     let distance = (on_board.x - on_track.x).hypot(on_board.y - on_track.y);
     ((FAR_M - distance) / (FAR_M - NEAR_M)).clamp(0.0, 1.0)
 }
@@ -160,10 +155,15 @@ fn nearness(track: &Track, on_board: Point) -> f32 {
 mod tests {
     use super::super::Classical;
     use super::*;
-    use crate::arm::Push;
-    use crate::belief::BeliefUpdate;
+    use crate::belief::{BeliefUpdate, SOLID};
     use crate::grid::{Grid, VoxelSet};
     use crate::scene::ClassId;
+    use crate::skill::push::{Push, SweptPush};
+
+    fn predicted(belief: &Belief, push: &SweptPush) -> Prediction {
+        let intervention = push.intervention(belief, &FloorPlan::new(belief, SOLID));
+        Classical.predict(belief, &[intervention]).remove(0)
+    }
 
     /// A shelf with a box of class 5 on it, `x` in +-5 cm, `y` in 20 to 28 cm, `z` below 10 cm, and one of class 7 to the
     /// right of where that is going, `x` in 8 to 12 cm, `y` in 22 to 26 cm; everything else known free. The tool passes
@@ -198,7 +198,7 @@ mod tests {
     fn swept_columns_become_free_and_background() {
         let (belief, push) = push_into_a_box();
         let mut after = belief.clone();
-        after.apply(&Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0]);
+        after.apply(&predicted(&belief, &push));
         let grid = &belief.grid;
         for index in push.swept.iter() {
             for voxel in grid.column(index / grid.dims[2]) {
@@ -220,7 +220,7 @@ mod tests {
         push.swept.insert(voxel(0.0, 0.22, 0.15));
         push.swept.insert(voxel(0.10, 0.24, 0.08));
         let mut after = belief.clone();
-        after.apply(&Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0]);
+        after.apply(&predicted(&belief, &push));
         assert_eq!(after.occupancy[voxel(0.0, 0.22, 0.05)], belief.occupancy[voxel(0.0, 0.22, 0.05)]);
         assert_eq!(after.likeliest(voxel(0.0, 0.22, 0.0) / grid.dims[2]).0, ClassId(5));
         assert!(after.probability(voxel(0.10, 0.24, 0.02)) < 0.05, "what was met has left, down to the board");
@@ -228,7 +228,7 @@ mod tests {
         let mut unknown = belief.clone();
         unknown.occupancy[grid.column(voxel(0.0, 0.22, 0.0) / grid.dims[2])].fill([1.0; 2]);
         let mut after = unknown.clone();
-        after.apply(&Classical.predict_pushes(&unknown, std::slice::from_ref(&push))[0]);
+        after.apply(&predicted(&unknown, &push));
         assert!(after.probability(voxel(0.0, 0.22, 0.30)) < 0.05);
         assert_eq!(after.occupancy[voxel(0.0, 0.22, 0.10)], [1.0; 2]);
     }
@@ -237,7 +237,7 @@ mod tests {
     fn the_box_moves_with_the_tool_and_leaves_free_space() {
         let (belief, push) = push_into_a_box();
         let mut after = belief.clone();
-        after.apply(&Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0]);
+        after.apply(&predicted(&belief, &push));
         let grid = &belief.grid;
         let voxel = |x: f32, y: f32, z: f32| grid.index(grid.voxel_at(Point::new(x, y, z)).expect("inside"));
         let p = |x: f32, y: f32, z: f32| (belief.probability(voxel(x, y, z)), after.probability(voxel(x, y, z)));
@@ -260,7 +260,7 @@ mod tests {
     #[test]
     fn things_near_the_push_are_forgotten_and_the_rest_is_kept() {
         let (belief, push) = push_into_a_box();
-        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        let prediction = &predicted(&belief, &push);
         let mut after = belief.clone();
         after.apply(prediction);
         let grid = &belief.grid;
@@ -282,7 +282,7 @@ mod tests {
     fn what_moves_stops_at_the_walls() {
         let (belief, mut push) = push_into_a_box();
         push.push.length_m = 0.20;
-        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        let prediction = &predicted(&belief, &push);
         let mut after = belief.clone();
         after.apply(prediction);
         let grid = &belief.grid;
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn nothing_outside_the_window_is_touched_and_the_window_is_not_the_whole_plan() {
         let (belief, push) = push_into_a_box();
-        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        let prediction = &predicted(&belief, &push);
         let grid = &belief.grid;
         let window = prediction.window;
         assert!(window.size()[0] < grid.dims[0] / 2, "{window:?}");
@@ -320,7 +320,7 @@ mod tests {
         let (mut belief, push) = push_into_a_box();
         let air = evidence(-3.5, 40.0);
         belief.occupancy.fill(air);
-        let prediction = &Classical.predict_pushes(&belief, std::slice::from_ref(&push))[0];
+        let prediction = &predicted(&belief, &push);
         assert!(prediction.change.iter().all(|p| *p < 0.03));
         assert!(prediction.occupancy.iter().all(|a| beta_mean(*a) < 0.05));
     }

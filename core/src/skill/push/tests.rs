@@ -1,8 +1,10 @@
 use super::frontier::likely_targets;
 use super::*;
+use crate::arm::{Hit, Obstacle};
 use crate::belief::evidence;
 use crate::grid::Grid;
 use crate::rng::stream;
+use crate::skill::Stage;
 use crate::{Point, Vector};
 
 /// A shelf believed free but for boxes `[x0, x1, y0, y1, height]` (metres), each with its class on its cells.
@@ -37,7 +39,15 @@ fn verdict(belief: &Belief, front: [f32; 3], direction_deg: f32, length_m: f32) 
     let clearance = ArmClearance::new(&arm, belief);
     let frontier = voxel_at(belief, front[0], front[1], front[2]);
     let push = Push { start: start_of(belief, frontier), direction_deg, length_m };
-    clearance.motion(&push, &clearance.target(frontier), &mut stream(1, "verdict", 0)).err()
+    push.motion(&clearance, &clearance.target(frontier), &mut stream(1, "verdict", 0)).err()
+}
+
+/// The push that was drawn.
+fn push_of(candidate: &Candidate) -> Push {
+    match candidate.manipulation {
+        Manipulation::Push(push) => push,
+        other => panic!("no push: {other:?}"),
+    }
 }
 
 /// Where on its way, and which voxel of the map, a blocked push meets.
@@ -114,7 +124,7 @@ fn a_box_beside_a_sideways_push_blocks_its_path() {
     let belief = believed(&boxes);
     assert_eq!(verdict(&belief, [-0.02, 0.20, 0.06], 90.0, 0.10), None, "straight in there is room");
     let (stage, at) = met(verdict(&belief, [-0.02, 0.20, 0.06], 0.0, 0.14));
-    assert_eq!(stage, Stage::Push);
+    assert_eq!(stage, Stage::Contact);
     assert!((0.09..0.16).contains(&at[0]) && (0.02..0.17).contains(&at[1]), "{at:?}");
     assert_eq!(verdict(&belief, [-0.02, 0.20, 0.06], 0.0, 0.03), None, "a shorter push stays clear of it");
 }
@@ -124,7 +134,7 @@ fn another_class_behind_the_target_blocks_and_its_own_class_does_not() {
     let touching = |class| believed(&[([-0.04, 0.04, 0.20, 0.24, TALL], 3), ([-0.04, 0.04, 0.24, 0.30, TALL], class)]);
     assert_eq!(verdict(&touching(3), [0.0, 0.20, 0.06], 90.0, 0.10), None);
     let (stage, at) = met(verdict(&touching(5), [0.0, 0.20, 0.06], 90.0, 0.10));
-    assert!(stage == Stage::Push && at[1] >= 0.24, "{stage:?} {at:?}");
+    assert!(stage == Stage::Contact && at[1] >= 0.24, "{stage:?} {at:?}");
     assert_eq!(verdict(&touching(5), [0.0, 0.20, 0.06], 90.0, 0.05), None, "before the tip gets there");
 }
 
@@ -135,7 +145,7 @@ fn walls_are_the_shelf_and_the_back_is_out_of_reach() {
     let towards_wall = believed(&[([0.30, 0.33, 0.20, 0.25, TALL], 3)]);
     assert_eq!(panel(verdict(&towards_wall, [0.31, 0.20, 0.06], 0.0, 0.10)), "right wall");
     let near_back = believed(&[([-0.02, 0.02, 0.30, 0.39, TALL], 3)]);
-    let too_far = Some(Rejection::Unreachable { stage: Stage::Push });
+    let too_far = Some(Rejection::Unreachable { stage: Stage::Contact });
     assert_eq!(verdict(&near_back, [0.0, 0.30, 0.06], 90.0, 0.15), too_far);
     assert_eq!(verdict(&near_back, [0.0, 0.30, 0.06], 90.0, 0.05), None);
 }
@@ -152,15 +162,15 @@ fn samples_are_what_the_method_says() {
     assert_eq!(candidates.iter().filter(|c| c.rejection.is_none()).count(), 30);
     assert!(candidates.last().is_some_and(|c| c.rejection.is_none()), "drawing ends with the last one wanted");
     for candidate in &candidates {
-        let (push, point) = (&candidate.swept.push, belief.grid.center(candidate.contact));
+        let (push, point) = (&push_of(candidate), belief.grid.center(candidate.contact));
         assert!((0.0..=180.0).contains(&push.direction_deg), "{push:?}");
         assert!((LENGTH_M[0]..LENGTH_M[1]).contains(&push.length_m), "{push:?}");
         assert_eq!(push.start, [point.x, point.y - STANDOFF_M, TOOL_HEIGHT_M]);
-        let swept = &candidate.swept.swept;
+        let swept = &candidate.swept;
         match &candidate.motion {
             Some(motion) => {
                 let ready = arm.ready.expect("it waits somewhere");
-                assert!(candidate.rejection.is_none() && motion.carries_out(&arm.arm, &ready, push));
+                assert!(candidate.rejection.is_none() && push.is_done_by(motion, &arm.arm, &ready));
                 assert_eq!(*swept, motion.swept_volume(&arm.arm, &belief.grid));
             }
             None => assert!(candidate.rejection.is_some()),
@@ -184,7 +194,7 @@ fn sampling_does_not_depend_on_the_number_of_threads_but_on_the_stream() {
     let on = |sampler: PushSampler, threads: usize, seed: u64| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let drawn = pool.install(|| sample(sampler, &belief, None, &arm, 20, &mut stream(seed, "pushes", 0)));
-        drawn.into_iter().map(|c| (c.contact, c.swept.push, c.rejection)).collect::<Vec<_>>()
+        drawn.into_iter().map(|c| (c.contact, push_of(&c), c.rejection)).collect::<Vec<_>>()
     };
     for sampler in PushSampler::ALL {
         assert_eq!(on(sampler, 1, 3), on(sampler, 4, 3));
@@ -235,7 +245,7 @@ fn pushes_before_what_is_hidden_touch_a_side_of_what_hides_it() {
     assert!(10 * at_wall > 9 * candidates.len(), "{at_wall} of {}", candidates.len());
     let mut across = 0;
     for candidate in candidates.iter().filter(|c| c.rejection != Some(Rejection::NoTarget)) {
-        let (push, contact) = (&candidate.swept.push, grid.center(candidate.contact));
+        let (push, contact) = (&push_of(candidate), grid.center(candidate.contact));
         assert!(belief.probability(grid.index(candidate.contact)) > CONFIDENT);
         let met = push.start_point() + push.direction() * STANDOFF_M;
         assert!((met.x - contact.x).hypot(met.y - contact.y) < 1e-4, "{push:?}");

@@ -1,10 +1,10 @@
 //! Contacts before unseen space: pushes against the front or the sides of what stands before it.
 
 use super::{CONFIDENT, LENGTH_M, STANDOFF_M, TOOL_HEIGHT_M};
-use crate::arm::Push;
 use crate::belief::{Belief, bernoulli_entropy};
 use crate::grid::{Cell, Grid, Voxel, VoxelSet};
 use crate::rng::ChaCha8Rng;
+use crate::skill::Push;
 use rand::Rng;
 
 /// How far above and below the tip something must stand to be met by it, metres.

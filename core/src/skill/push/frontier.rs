@@ -1,10 +1,10 @@
 //! The frontier: the first surely occupied voxels seen from the shelf's entrance; and pushes from it into the shelf.
 
 use super::{CONFIDENT, LENGTH_M, LIKELY, REACH_M, STANDOFF_M, TOOL_HEIGHT_M};
-use crate::arm::Push;
 use crate::belief::Belief;
 use crate::grid::Voxel;
 use crate::rng::ChaCha8Rng;
+use crate::skill::Push;
 use rand::Rng;
 
 /// The frontier of a belief, from which points are drawn without replacement.

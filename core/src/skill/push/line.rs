@@ -1,5 +1,8 @@
-//! One straight push, as a policy, a person or a file names it; [`super::PushMotion`] is how the arm carries it out.
+//! One straight push, as a policy, a person or a file names it; a [`PhasedMotion`](crate::arm::PhasedMotion) is how the arm
+//! carries it out.
 
+use crate::belief::Stroke;
+use crate::skill::Arrow;
 use crate::{Point, Vector};
 use serde::{Deserialize, Serialize};
 
@@ -30,5 +33,15 @@ impl Push {
     /// The tip's position at the end.
     pub fn end_point(&self) -> Point {
         self.start_point() + self.direction() * self.length_m
+    }
+
+    /// The way of the tip in contact.
+    pub fn stroke(&self) -> Stroke {
+        Stroke { start: self.start_point(), direction: self.direction(), length_m: self.length_m }
+    }
+
+    /// The same, to be drawn.
+    pub fn arrow(&self) -> Arrow {
+        Arrow { start: self.start_point(), way: self.direction() * self.length_m }
     }
 }

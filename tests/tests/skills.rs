@@ -1,0 +1,55 @@
+//! Skills beside the push, from the command line: chosen by name, carried out, filed, repeated.
+
+use nudge_tests::{nudge_fails, nudge_ok};
+use serde_json::Value;
+use std::path::Path;
+
+/// Two low tins with room behind them.
+const SCENE: &str = "format = 1\nname = \"tins\"\n[shelf]\nsize = [0.8, 0.4, 0.4]\nvoxel_m = 0.01\n\
+    [[object]]\nclass = \"meat_can\"\nposition = [-0.08, 0.14]\n\
+    [[object]]\nclass = \"gum_tin\"\nposition = [0.12, 0.16]\n";
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("utf-8")
+}
+
+#[test]
+fn a_drag_runs_is_filed_and_is_repeated_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("tempdir");
+    let (scene, out) = (folder.path().join("tins.toml"), folder.path().join("e"));
+    std::fs::write(&scene, SCENE).expect("written");
+    let run = ["run", text(&scene), "--belief", "classical", "--policy", "random-push-5", "--budget", "6", "--seed", "1"];
+    let said = nudge_ok(&[&run[..], &["--skills", "drag", "--closing-steps", "1", "--out", text(&out)]].concat());
+    assert!(said.contains("drag ") && said.contains(" mm at "), "{said}");
+    let file = out.join("episode.json");
+    let record: Value = serde_json::from_slice(&std::fs::read(&file).expect("a document")).expect("JSON");
+    assert_eq!(record["planner"]["skills"], serde_json::json!(["drag"]));
+    let step = &record["steps"][4];
+    assert_eq!(step["action"]["kind"], "drag", "{step}");
+    assert!(step["action"]["pitch_deg"].is_number() && step["displacement_m"].as_f64().expect("metres") > 0.0);
+    assert!(out.join("recording.rrd").is_file());
+    assert!(nudge_ok(&["replay", text(&out)]).contains("bit for bit"));
+
+    // A program that lacks the skill says so in one line.
+    let other = String::from_utf8(std::fs::read(&file).expect("a document")).expect("utf-8");
+    std::fs::write(&file, other.replace("\"kind\": \"drag\"", "\"kind\": \"juggle\"")).expect("written");
+    let line = nudge_fails(2, &["replay", text(&out)]);
+    assert!(line.contains("episode.json: line ") && line.ends_with("no skill `juggle`; it has push, drag"), "{line}");
+}
+
+#[test]
+fn candidates_of_both_skills_are_weighed_together() {
+    let folder = tempfile::tempdir().expect("tempdir");
+    let (scene, out) = (folder.path().join("tins.toml"), folder.path().join("e"));
+    std::fs::write(&scene, SCENE).expect("written");
+    let run = ["run", text(&scene), "--belief", "classical", "--budget", "5", "--candidates", "3", "--out", text(&out)];
+    nudge_ok(&[&run[..], &["--skills", "drag,push"]].concat());
+    let text = std::fs::read(out.join("episode.json")).expect("a document");
+    let record: Value = serde_json::from_slice(&text).expect("JSON");
+    assert_eq!(record["planner"]["skills"], serde_json::json!(["push", "drag"]));
+    let candidates = record["steps"][3]["decision"]["candidates"].as_array().expect("candidates");
+    for kind in ["push", "drag"] {
+        let of: Vec<&Value> = candidates.iter().filter(|candidate| candidate["kind"] == kind).collect();
+        assert!(of.iter().any(|candidate| candidate["gain"].is_number()), "{kind}: {of:?}");
+    }
+}

@@ -4,7 +4,8 @@
 #   install.sh BINARY [PREFIX]        PREFIX is ~/.local unless told
 #   install.sh --uninstall [PREFIX]   removes what the manifest lists, and nothing else
 #
-#   PREFIX/bin/nudge                  the program
+#   PREFIX/bin/nudge                  the program that starts it
+#   PREFIX/libexec/nudge-program      the program
 #   PREFIX/lib/nudge                  the shared libraries that it needs and the system lacks (libtorch)
 #   PREFIX/share/nudge                weights, scenes, assets, this script, manifest.txt
 #   PREFIX/share/…                    man pages, completions, and for the window its desktop entry, icon and file types
@@ -54,6 +55,11 @@ clean_up() {
     [ -z "$stage" ] || rm -rf -- "$stage"
     local at
     for ((at = ${#made[@]} - 1; at >= 0; at--)); do rmdir --ignore-fail-on-non-empty -- "${made[at]}" 2>/dev/null || true; done
+}
+
+# What `nudge` starts: it lies beside it.
+program_of() { # binary
+    echo "$(dirname -- "$1")/nudge-program"
 }
 
 # The shared libraries of a program that are not the system's own: `name path`.
@@ -112,6 +118,7 @@ lay_out() { # binary
     local name path found
     local -a alone=(env -u NUDGE_MODELS -u NUDGE_SCENES)
     put 755 "$1" bin/nudge
+    put 755 "$(program_of "$1")" libexec/nudge-program
     while read -r name path; do
         if [ -n "$path" ]; then put 755 "$path" "lib/nudge/$name"; fi
     done <<<"$needed"
@@ -126,7 +133,7 @@ lay_out() { # binary
     for path in "$source"/LICENSE-*; do put 644 "$path" "share/nudge/${path##*/}"; done
 
     # The program as it will lie there, told nothing of where its things are.
-    found=$(libraries "$stage/bin/nudge")
+    found=$(libraries "$stage/libexec/nudge-program")
     while read -r name path; do
         case $(realpath -m -- "$path") in
         "$(realpath -m -- "$stage")/lib/nudge/"*) ;;
@@ -263,11 +270,13 @@ install_program() { # BINARY, PREFIX
     source=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
     [ -e "$source/Cargo.toml" ] || fail "an installed copy of this script only uninstalls; run scripts/install.sh of a checkout"
     [ -f "$binary" ] && [ -x "$binary" ] || fail "$binary: no such program; build it first (make workbench-build)"
+    file=$(program_of "$binary")
+    [ -f "$file" ] && [ -x "$file" ] || fail "$file: no such program; build it first (make workbench-build)"
     set_prefix "${2:-}"
     read_manifest
-    needed=$(libraries "$binary")
+    needed=$(libraries "$file")
     needed=$(with_cuda "$needed")
-    need_mb=$(($(megabytes "$needed") + $(du -Lcm -- "$binary" "$source/models" "$source/scenes" "$source/assets" | tail -n 1 | cut -f 1)))
+    need_mb=$(($(megabytes "$needed") + $(du -Lcm -- "$binary" "$file" "$source/models" "$source/scenes" "$source/assets" | tail -n 1 | cut -f 1)))
 
     trap clean_up EXIT
     trap 'exit 130' INT TERM

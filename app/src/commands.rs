@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand.
 
 use crate::planner_args::PlannerArgs;
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
 use std::process::ExitCode;
@@ -90,6 +91,25 @@ enum Command {
     Manual(manual::Args),
 }
 
+/// What was typed. Wrong use ends the program with one line and exit code 2, help and version with what was asked for.
+fn parse() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        if !error.use_stderr() || error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+            error.exit();
+        }
+        eprintln!("nudge: {}", in_one_line(&error.to_string()));
+        std::process::exit(2);
+    })
+}
+
+/// What clap says of wrong use, without the usage that it prints below.
+fn in_one_line(said: &str) -> String {
+    let lines = said.lines().map(str::trim).take_while(|line| !line.starts_with("Usage:"));
+    let lines = lines.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
+    let said = lines.map(|line| line.strip_prefix("error: ").unwrap_or(line)).collect::<Vec<_>>().join(" ");
+    format!("{}; --help tells more", said.replace(" tip: ", "; "))
+}
+
 /// Parses the command line, runs the command and turns errors into one line and an exit code: 0 for success, 1 for a
 /// failed check, 2 for wrong use, bad input, or an output that fails.
 pub fn main() -> ExitCode {
@@ -100,7 +120,7 @@ pub fn main() -> ExitCode {
             hook(panic);
         }
     }));
-    let result = match Cli::parse().command {
+    let result = match parse().command {
         #[cfg(feature = "workbench")]
         None => open::run(&open::Args::default()),
         Some(Command::Open(args)) => open::run(&args),
@@ -198,9 +218,7 @@ fn warn(message: &str) {
 #[cfg(test)]
 mod tests {
     use super::Cli;
-    use clap::CommandFactory;
-    #[cfg(not(feature = "workbench"))]
-    use clap::Parser;
+    use clap::{CommandFactory, Parser};
 
     #[test]
     fn help_lists_the_windows_commands_in_every_build() {
@@ -217,5 +235,23 @@ mod tests {
         let Some(super::Command::Shot(args)) = Cli::try_parse_from(typed).expect("taken").command else { panic!() };
         let said = super::shot::run(&args).expect_err("no window").to_string();
         assert!(said.contains("make workbench"), "{said}");
+    }
+
+    fn said(args: &[&str]) -> String {
+        let error = Cli::try_parse_from(args).err().expect("wrong use");
+        super::in_one_line(&error.to_string())
+    }
+
+    #[test]
+    fn wrong_use_is_told_in_one_line() {
+        assert_eq!(
+            said(&["nudge", "scene", "check"]),
+            "the following required arguments were not provided: <FILE>...; --help tells more"
+        );
+        assert_eq!(
+            said(&["nudge", "settings", "--jso"]),
+            "unexpected argument '--jso' found; a similar argument exists: '--json'; --help tells more"
+        );
+        assert!(said(&["nudge", "fly"]).starts_with("unrecognized subcommand 'fly'"));
     }
 }

@@ -3,7 +3,7 @@
 //! Looked for in this order:
 //!
 //! 1. the folder that an environment variable names ([`Shipped::variable`]);
-//! 2. `share/nudge` beside the folder of the program, as `make install` lays it out (`bin/nudge`, `share/nudge/models`);
+//! 2. `share/nudge` beside the folder of the program, as `make install` lays it out (`libexec/nudge-program`, `share/nudge/models`);
 //! 3. the checkout that the program lies in, or that it was built from, as long as it is there.
 //!
 //! What the working directory holds plays no part: an installed program does the same from any folder. View arrays, the

@@ -16,6 +16,11 @@ pub fn nudge_bin() -> PathBuf {
     bin
 }
 
+/// What `nudge` starts: it lies beside it.
+pub fn program_bin() -> PathBuf {
+    nudge_bin().with_file_name("nudge-program")
+}
+
 /// The repository's root.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("workspace").to_owned()

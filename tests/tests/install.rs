@@ -1,6 +1,6 @@
 //! `scripts/install.sh`: the program runs from its prefix when the checkout is gone, and goes away again without a trace.
 
-use nudge_tests::{in_own_mounts, nudge_bin, root, text, with_small_disk};
+use nudge_tests::{in_own_mounts, nudge_bin, program_bin, root, text, with_small_disk};
 use serde_json::Value;
 use std::fs::{create_dir_all, read_to_string, set_permissions, write};
 use std::os::unix::fs::PermissionsExt;
@@ -61,7 +61,7 @@ fn alone(prefix: &Path, folder: &Path, args: &[&str]) -> Output {
 /// The checkout, the built program's folder, and the folders of the libraries that it finds by its run path.
 fn hidden() -> Vec<PathBuf> {
     let mut hidden = vec![root(), nudge_bin().parent().expect("a folder").to_owned()];
-    let run_path = run_path(&nudge_bin());
+    let run_path = run_path(&program_bin());
     hidden.extend(run_path.split(':').filter(|at| at.starts_with('/')).map(PathBuf::from).filter(|at| at.is_dir()));
     hidden
 }
@@ -115,7 +115,7 @@ fn the_installed_program_runs_when_the_checkout_is_gone_and_leaves_without_a_tra
     assert_eq!(found["problems"], serde_json::json!([]));
     assert!(doctor.status.success());
     let at = |below: &str| Value::from(prefix.join(below).to_str().expect("utf-8"));
-    assert_eq!(found["program"], at("bin/nudge"));
+    assert_eq!(found["program"], at("libexec/nudge-program"));
     assert_eq!(found["weights"]["folder"], at("share/nudge/models"));
     assert_eq!(found["weights"]["load"] == true, found["networks"] == true);
     assert_eq!(found["scenes"]["folder"], at("share/nudge/scenes"));
@@ -131,8 +131,9 @@ fn the_installed_program_runs_when_the_checkout_is_gone_and_leaves_without_a_tra
             (&found["libtorch"]["folder"], &found["libtorch"]["version"]),
             (&at("lib/nudge"), &Value::from("2.13.0"))
         );
-        assert!(run_path(&prefix.join("bin/nudge")).starts_with("$ORIGIN/../lib/nudge:"));
-        let libraries = foreign_libraries(&prefix.join("bin/nudge"));
+        let program = prefix.join("libexec/nudge-program");
+        assert!(run_path(&program).starts_with("$ORIGIN/../lib/nudge:"));
+        let libraries = foreign_libraries(&program);
         assert!(libraries.iter().any(|path| path.ends_with("libtorch_cpu.so")), "{libraries:?}");
         let inside = prefix.join("lib/nudge").canonicalize().expect("libraries");
         assert!(libraries.iter().all(|path| path.starts_with(&inside)), "{libraries:?}");
@@ -193,6 +194,40 @@ fn runs_as_another_user(prefix: &Path, folder: &Path) {
     let doctor = command.output().expect("setpriv");
     assert_eq!(json(&doctor)["problems"], serde_json::json!([]));
     assert!(doctor.status.success());
+}
+
+/// The two programs in a prefix of their own, and the libraries' folder that they look into first.
+fn prefix_without_libraries(prefix: &Path) -> PathBuf {
+    for (from, to) in [(nudge_bin(), "bin/nudge"), (program_bin(), "libexec/nudge-program")] {
+        let to = prefix.join(to);
+        create_dir_all(to.parent().expect("a folder")).expect("made");
+        std::fs::copy(from, to).expect("copied");
+    }
+    let libraries = prefix.join("lib/nudge");
+    create_dir_all(&libraries).expect("made");
+    libraries
+}
+
+#[test]
+fn a_library_that_is_missing_or_damaged_is_told_in_one_line_by_the_program_and_not_by_the_loader() {
+    if !run_path(&program_bin()).contains("libtorch") {
+        eprintln!("not checked: this build needs no libtorch");
+        return;
+    }
+    let (folder, prefix) = stage();
+    let libraries = prefix_without_libraries(&prefix);
+    let missing = alone(&prefix, folder.path(), &["settings"]);
+    // It finds libtorch where nobody may hide it; `alone` has said so then.
+    if !missing.status.success() {
+        let missing = refused(&missing);
+        assert!(missing.contains("libtorch_cpu.so, libc10.so not found; this is libtorch"), "{missing}");
+    }
+    write(libraries.join("libtorch_cpu.so"), "").expect("written");
+    let damaged = refused(&alone(&prefix, folder.path(), &["settings"]));
+    assert!(damaged.contains("lib/nudge/libtorch_cpu.so: file too short; this is libtorch"), "{damaged}");
+    std::fs::remove_file(prefix.join("libexec/nudge-program")).expect("removed");
+    let gone = refused(&alone(&prefix, folder.path(), &["settings"]));
+    assert!(gone.contains("bin/nudge-program: there is no such program"), "{gone}");
 }
 
 #[test]

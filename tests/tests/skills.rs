@@ -18,7 +18,8 @@ fn a_drag_runs_is_filed_and_is_repeated_bit_for_bit() {
     let folder = tempfile::tempdir().expect("tempdir");
     let (scene, out) = (folder.path().join("tins.toml"), folder.path().join("e"));
     std::fs::write(&scene, SCENE).expect("written");
-    let run = ["run", text(&scene), "--belief", "classical", "--policy", "random-push-5", "--budget", "6", "--seed", "1"];
+    let run =
+        ["run", text(&scene), "--belief", "classical", "--policy", "random-push-5", "--budget", "6", "--seed", "1"];
     let said = nudge_ok(&[&run[..], &["--skills", "drag", "--closing-steps", "1", "--out", text(&out)]].concat());
     assert!(said.contains("drag ") && said.contains(" mm at "), "{said}");
     let file = out.join("episode.json");

@@ -6,7 +6,7 @@ use super::{Action, Counted, Decision, Gain, PlannerSettings, PolicyKind, Reason
 use crate::belief::Belief;
 use crate::camera::ViewId;
 use crate::rng::stream;
-use crate::skill::PushTruth;
+use crate::skill::{PushTruth, SkillKind};
 use rand::Rng;
 use rayon::prelude::*;
 
@@ -77,8 +77,25 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
     decision
 }
 
-/// Applies the rule to what was weighed.
-fn choose(decision: &mut Decision, weighed: Weighed, settings: &PlannerSettings) {
+/// Applies the rule to what was weighed. What is held goes where it is set down, so a pick keeps what it promises and has to
+/// promise no more than looking does, as in the paper's rule: patience and floor are for pushes, whose outcomes surprise.
+fn choose(decision: &mut Decision, mut weighed: Weighed, settings: &PlannerSettings) {
+    let mut settings = *settings;
+    if let Some(pick) = weighed.best_of(SkillKind::Pick) {
+        let rule = |at: usize, settings: &PlannerSettings| {
+            let candidate = &weighed.candidates[at];
+            let (igm, reg) = (candidate.gain.unwrap_or(0.0), candidate.reg.unwrap_or(0.0));
+            let looking = settings.patience * decision.igv;
+            look_or_push(looking, settings.push_floor, igm, reg, settings.gamma)
+        };
+        let paper = PlannerSettings { patience: 1.0, push_floor: 0.0, ..settings };
+        let pushes = weighed.best.is_some_and(|best| best != pick && rule(best, &settings) == Reason::PushTellsMore);
+        if !pushes && rule(pick, &paper) == Reason::PushTellsMore {
+            (weighed.best, settings) = (Some(pick), paper);
+            decision.rule = decision.rule.map(|rule| Rule { settings, ..rule });
+        }
+    }
+    let settings = &settings;
     let Some(best) = take_over(decision, weighed).map(|at| &decision.candidates[at]) else { return };
     decision.igm = best.gain.unwrap_or(0.0);
     decision.reg = best.reg.unwrap_or(0.0);

@@ -5,7 +5,7 @@ use super::{CandidateRecord, Gain, PlannerSettings, Situation};
 use crate::arm::PhasedMotion;
 use crate::belief::{Belief, FloorPlan, Intervention, Prediction, SOLID};
 use crate::rng::stream;
-use crate::skill::{Candidate, Ground, PushSampler, PushTruth, random_candidate};
+use crate::skill::{Candidate, Ground, PushSampler, PushTruth, SkillKind, random_candidate};
 use rayon::prelude::*;
 
 /// The pushes that were weighed.
@@ -18,6 +18,15 @@ pub(super) struct Weighed {
 }
 
 impl Weighed {
+    /// Position of the candidate of a skill with the largest gain, the first of equals.
+    pub(super) fn best_of(&self, kind: SkillKind) -> Option<usize> {
+        let gain = |at: usize| self.candidates[at].gain.filter(|_| self.candidates[at].manipulation.kind() == kind);
+        let weighed = (0..self.candidates.len()).filter_map(|at| Some((at, gain(at)?)));
+        weighed
+            .fold(None, |best, (at, gain)| best.filter(|(_, most)| *most >= gain).or(Some((at, gain))))
+            .map(|(at, _)| at)
+    }
+
     /// The arm's motion for the best push.
     pub(super) fn take_motion(&mut self) -> Option<PhasedMotion> {
         self.best.and_then(|at| self.motions[at].take())

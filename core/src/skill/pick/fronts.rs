@@ -5,7 +5,7 @@ use super::{Pick, PickPlace};
 use crate::Point;
 use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch};
 use crate::grid::{Cell, Voxel, VoxelSet};
-use crate::skill::{AVOIDED, Rejection};
+use crate::skill::{AVOIDED, LIKELY, Rejection};
 use crate::world::STROKE_M;
 
 /// Heights of the cup's middle above the board, metres.
@@ -14,8 +14,6 @@ const HEIGHTS_M: [f32; 2] = [0.03, 0.12];
 const TRIED_M: [f32; 5] = [0.0, 0.02, -0.02, 0.04, -0.04];
 /// Largest tangent of the angle between a front and the entrance's plane: 30 degrees.
 const STEEPEST: f32 = 0.577;
-/// Occupancy probability from which a voxel may be in the way of what is carried: it is not seen free.
-const MAY_BLOCK: f32 = 0.5;
 /// Occupancy probability above which nothing is set down in a voxel.
 const SEEN_FREE: f32 = 0.3;
 /// Occupancy probabilities between which nobody knows what is in a voxel.
@@ -121,7 +119,7 @@ impl<'a> Shelf<'a> {
     fn with_room<T>(&self, work: impl FnOnce(&Room<'_>) -> T) -> T {
         let belief = self.belief;
         let is_seen = |voxel: usize| self.seen.is_some_and(|seen| seen.contains(voxel));
-        let blocks = |voxel: usize| belief.probability(voxel) >= MAY_BLOCK;
+        let blocks = |voxel: usize| belief.probability(voxel) >= LIKELY;
         let is_taken = |voxel: usize| belief.probability(voxel) > SEEN_FREE;
         let is_unknown = |voxel: usize| {
             let p = belief.probability(voxel);

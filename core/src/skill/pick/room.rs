@@ -66,6 +66,14 @@ impl Room<'_> {
         (column.start + self.lift()..column.start + top).all(|voxel| !(self.blocks)(voxel))
     }
 
+    /// Whether a floor cell is the object's or touches one of its cells.
+    fn is_rim(&self, target: &Patch, cell: usize) -> bool {
+        let [width, depth, _] = self.grid.dims;
+        let (x, y) = (cell / depth, cell % depth);
+        let xs = x.saturating_sub(1)..(x + 2).min(width);
+        xs.into_iter().any(|x| (y.saturating_sub(1)..(y + 2).min(depth)).any(|y| target.contains(x * depth + y)))
+    }
+
     /// Whether an object can be lifted and pulled straight out of the shelf.
     ///
     /// # Errors
@@ -75,11 +83,12 @@ impl Room<'_> {
         if extent.levels + self.lift() > self.grid.dims[2] {
             return Err(Rejection::NoWayOut);
         }
-        for x in extent.x[0]..=extent.x[1] {
+        // Maps are a cell wide of the truth at rims: the outermost columns and the cells beside the object are its own.
+        for x in extent.x[0] + 1..extent.x[1] {
             let cells = x * depth..x * depth + extent.y[1] + 1;
             let Some(last) = cells.clone().rfind(|cell| target.contains(*cell)) else { continue };
-            let before = (cells.start..last).filter(|cell| !target.contains(*cell));
-            if before.into_iter().any(|cell| !self.is_passable(cell, extent.levels)) {
+            let mut before = (cells.start..last).filter(|cell| !self.is_rim(target, *cell));
+            if before.any(|cell| !self.is_passable(cell, extent.levels)) {
                 return Err(Rejection::NoWayOut);
             }
         }
@@ -146,7 +155,7 @@ impl Places {
             first..first + extent.levels
         };
         // The object itself is in hand.
-        let other = |cell: usize| !target.contains(cell);
+        let other = |cell: usize| !room.is_rim(target, cell);
         Self {
             extent,
             margin: room.cells(MARGIN_M),

@@ -54,3 +54,36 @@ fn candidates_of_both_skills_are_weighed_together() {
         assert!(of.iter().any(|candidate| candidate["gain"].is_number()), "{kind}: {of:?}");
     }
 }
+
+#[test]
+fn a_pick_runs_with_the_hand_that_it_needs_is_filed_and_is_repeated_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("tempdir");
+    let (scene, out) = (folder.path().join("tins.toml"), folder.path().join("e"));
+    std::fs::write(&scene, SCENE).expect("written");
+    for (place, end) in [("shelf", "set_down"), ("tray", "stowed")] {
+        let run = ["run", text(&scene), "--belief", "classical", "--policy", "greedy-front-pick", "--budget", "6"];
+        let said = nudge_ok(&[&run[..], &["--place", place, "--force", "--out", text(&out)]].concat());
+        assert!(said.contains("pick at ("), "{said}");
+        let record: Value =
+            serde_json::from_slice(&std::fs::read(out.join("episode.json")).expect("there")).expect("JSON");
+        assert_eq!(record["scene"]["robot"]["urdf"]["source"], "ur5_suction.urdf");
+        let step = &record["steps"][4];
+        assert_eq!((&step["action"]["kind"], &step["push"]["grip"]["end"]), (&"pick".into(), &end.into()), "{step}");
+        let verdicts = record["steps"][5]["verdicts"].as_array().map_or(0, Vec::len);
+        assert!(verdicts == 0 || verdicts == if place == "tray" { 1 } else { 2 }, "{verdicts}");
+        assert!(nudge_ok(&["replay", text(&out)]).contains("bit for bit"));
+        assert!(nudge_ok(&["replay", "--infer", text(&out)]).contains("bit for bit"));
+    }
+}
+
+#[test]
+fn a_policy_that_picks_with_a_hand_without_a_cup_is_refused_in_one_line() {
+    let folder = tempfile::tempdir().expect("tempdir");
+    let scene = folder.path().join("tins.toml");
+    std::fs::write(&scene, SCENE).expect("written");
+    let run = ["run", text(&scene), "--belief", "classical", "--policy", "mem-pick", "--arm"];
+    let line = nudge_fails(2, &[&run[..], &["gripper"]].concat());
+    assert!(line.contains("ur5_2f85 has no cup; choose --arm suction"), "{line}");
+    let line = nudge_fails(2, &[&run[..], &["no-such-arm.urdf"]].concat());
+    assert!(line.contains("no-such-arm.urdf"), "{line}");
+}

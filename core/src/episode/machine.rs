@@ -14,7 +14,7 @@ use crate::plan::{self, Action, Decision, History, Situation};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::skill::{ArmClearance, Candidate, Counterfactual, Ground, Manipulation};
-use crate::world::{ManipulationOutcome, TruthMap};
+use crate::world::TruthMap;
 use crate::{Error, Result};
 use std::sync::Arc;
 use std::time::Instant;

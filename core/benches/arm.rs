@@ -212,8 +212,7 @@ fn pushes(scenes: &[Crowded]) {
             processor
         );
         let mut reasons = std::collections::BTreeMap::<String, usize>::new();
-        for rejection in candidates.iter().filter_map(|c| c.rejection.as_ref()) {
-            let words = rejection.to_string();
+        for words in candidates.iter().filter_map(|c| Some(c.manipulation.against(c.rejection.as_ref()?))) {
             let words = words.split(" would").next().unwrap_or_default().split(" by what").next().unwrap_or_default();
             *reasons.entry(words.to_owned()).or_default() += 1;
         }

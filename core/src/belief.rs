@@ -13,7 +13,6 @@ mod sightings;
 
 pub use classical::{Classical, LOG_ODDS_LIMIT, LOG_ODDS_STEP, evidence, log_odds};
 pub use floor::{FloorPlan, Patch};
-pub(crate) use held::predict_held_apart;
 pub(crate) use intervention::Met;
 #[cfg(feature = "cnabu")]
 pub(crate) use intervention::Moved;
@@ -234,6 +233,24 @@ pub trait BeliefUpdate: Send + Sync {
     /// The beliefs that manipulations are predicted to leave: `lambda' = sigma_m(lambda, intervention)`, one prediction per
     /// intervention.
     fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction>;
+}
+
+/// Predictions in order: of what is held by this rule, of the rest what `rest` answers.
+pub(crate) fn predict_held_apart(
+    belief: &Belief,
+    interventions: &[Intervention],
+    rest: impl FnOnce(&[Intervention]) -> Vec<Prediction>,
+) -> Vec<Prediction> {
+    if interventions.iter().all(|intervention| intervention.held.is_none()) {
+        return rest(interventions);
+    }
+    let others: Vec<Intervention> = interventions.iter().filter(|one| one.held.is_none()).cloned().collect();
+    let mut others = if others.is_empty() { Vec::new() } else { rest(&others) }.into_iter();
+    let of = |one: &Intervention| match one.held {
+        Some(chance) => Some(held::predict(belief, one, chance)),
+        None => others.next(),
+    };
+    interventions.iter().filter_map(of).collect()
 }
 
 #[cfg(test)]

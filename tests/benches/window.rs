@@ -140,7 +140,7 @@ fn windows_of(picture: &std::path::Path) -> Vec<std::path::PathBuf> {
     let is = |path: &std::path::PathBuf| {
         let comm = std::fs::read_to_string(path.join("comm")).unwrap_or_default();
         let line = std::fs::read(path.join("cmdline")).unwrap_or_default();
-        comm.trim() == "nudge" && String::from_utf8_lossy(&line).contains(&name)
+        comm.trim() == "nudge-program" && String::from_utf8_lossy(&line).contains(&name)
     };
     processes.filter(is).collect()
 }

@@ -35,8 +35,8 @@ const WRONG: [(&str, &str, &str); 10] = [
     ("--certain", "inf", "--certain inf: must be a probability from 0 to 1"),
     ("--quiet-steps", "1.5", "--quiet-steps 1.5: must be a whole number of steps from 0 to 1000"),
     ("--saturation", "-0.1", "--saturation -0.1: must be a share from 0 to 1"),
-    ("--skills", "fly", "--skills fly: must be one or more of push, drag, with commas between"),
-    ("--skills", "", "--skills : must be one or more of push, drag, with commas between"),
+    ("--skills", "fly", "--skills fly: must be one or more of push, drag, pick, with commas between"),
+    ("--skills", "", "--skills : must be one or more of push, drag, pick, with commas between"),
     ("--gain", "some", "--gain some: must be all or unseen"),
     ("--noise", "d435", "unknown noise \"d435\"; there are none, standard, l515"),
 ];

@@ -35,7 +35,10 @@ fn a_drag_runs_is_filed_and_is_repeated_bit_for_bit() {
     let other = String::from_utf8(std::fs::read(&file).expect("a document")).expect("utf-8");
     std::fs::write(&file, other.replace("\"kind\": \"drag\"", "\"kind\": \"juggle\"")).expect("written");
     let line = nudge_fails(2, &["replay", text(&out)]);
-    assert!(line.contains("episode.json: line ") && line.ends_with("no skill `juggle`; it has push, drag"), "{line}");
+    assert!(
+        line.contains("episode.json: line ") && line.ends_with("no skill `juggle`; it has push, drag, pick"),
+        "{line}"
+    );
 }
 
 #[test]

@@ -68,7 +68,7 @@ fn sockets(process: u32) -> Vec<Socket> {
     open
 }
 
-/// Processes named nudge below another.
+/// Processes of the program, once `nudge` has become it, below another.
 fn windows_below(parent: u32) -> Vec<u32> {
     let listed = Command::new("ps").args(["-e", "-o", "pid=,ppid=,comm="]).output().map(|output| text(&output.stdout));
     let rows: Vec<(u32, u32, String)> = listed
@@ -88,7 +88,7 @@ fn windows_below(parent: u32) -> Vec<u32> {
         }
         false
     };
-    rows.iter().filter(|(pid, _, name)| name == "nudge" && below(*pid)).map(|(pid, ..)| *pid).collect()
+    rows.iter().filter(|(pid, _, name)| name == "nudge-program" && below(*pid)).map(|(pid, ..)| *pid).collect()
 }
 
 /// Runs `nudge` with arguments under a virtual display until it ends by itself; `look` is shown the window's process

@@ -63,24 +63,6 @@ fn mixed(before: [f32; 2], after: [f32; 2], p: f32) -> [f32; 2] {
     [mean * total, (1.0 - mean) * total]
 }
 
-/// Predictions in order: of what is held by this rule, of the rest what `rest` answers.
-pub(crate) fn predict_held_apart(
-    belief: &Belief,
-    interventions: &[Intervention],
-    rest: impl FnOnce(&[Intervention]) -> Vec<Prediction>,
-) -> Vec<Prediction> {
-    if interventions.iter().all(|intervention| intervention.held.is_none()) {
-        return rest(interventions);
-    }
-    let others: Vec<Intervention> = interventions.iter().filter(|one| one.held.is_none()).cloned().collect();
-    let mut others = if others.is_empty() { Vec::new() } else { rest(&others) }.into_iter();
-    let of = |one: &Intervention| match one.held {
-        Some(chance) => Some(predict(belief, one, chance)),
-        None => others.next(),
-    };
-    interventions.iter().filter_map(of).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

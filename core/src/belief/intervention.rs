@@ -142,6 +142,7 @@ pub(crate) struct Moved {
 
 impl Moved {
     /// Whether nothing moves.
+    #[cfg(any(test, feature = "cnabu"))]
     pub(crate) fn is_nothing(&self) -> bool {
         self.source.is_empty()
     }

@@ -77,7 +77,10 @@ fn an_episode_with_a_skill_that_this_program_lacks_is_refused_in_one_line() {
     let text = synthetic::record(2).to_json().replace(r#""kind": "push""#, r#""kind": "fly""#);
     let error = EpisodeRecord::from_json(&text, Path::new("e.json")).expect_err("refuses").to_string();
     assert!(error.starts_with("e.json: line "), "{error}");
-    assert!(error.ends_with("this program has no skill `fly`; it has push, drag") && !error.contains('\n'), "{error}");
+    assert!(
+        error.ends_with("this program has no skill `fly`; it has push, drag, pick") && !error.contains('\n'),
+        "{error}"
+    );
 }
 
 #[test]

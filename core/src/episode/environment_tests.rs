@@ -7,6 +7,7 @@ use crate::arm::Arm;
 use crate::belief::Classical;
 use crate::camera::{Intrinsics, NoiseModel};
 use crate::plan::PolicyKind;
+use crate::world::ManipulationOutcome;
 use std::collections::BTreeMap;
 use std::path::Path;
 use tempfile::tempdir;

@@ -83,13 +83,7 @@ impl Episode {
         }
         let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
-        if policy.picks() && arm.arm.cup.is_none() {
-            let message = format!(
-                "policy {policy} takes objects by suction, and the hand of {} has no cup; choose --arm suction",
-                arm.arm.name
-            );
-            return Err(Error::Usage(message));
-        }
+        policy.check_hand(&arm.arm)?;
         let hands = Arc::new(views.hand_poses(&arm));
         let unreachable = Arc::new(views.unreachable(&hands));
         let estimate = Estimate::uniform(&scene.grid());

@@ -1,6 +1,7 @@
 //! The policies by name, and what each of them does.
 
 use super::PlannerSettings;
+use crate::arm::Arm;
 use crate::belief::{CLASSICAL, CNABU};
 use crate::named;
 use crate::skill::{SkillKind, SkillSet};
@@ -101,6 +102,21 @@ impl PolicyKind {
     /// Whether it takes objects by suction, so that the hand needs a cup.
     pub fn picks(self) -> bool {
         matches!(self, Self::MemPick | Self::RandomPick5 | Self::GreedyFrontPick)
+    }
+
+    /// Whether an arm has the hand that the policy needs.
+    ///
+    /// # Errors
+    /// One line that names the arm, for a policy that picks with a hand without a suction cup.
+    pub fn check_hand(self, arm: &Arm) -> Result<()> {
+        if !self.picks() || arm.cup.is_some() {
+            return Ok(());
+        }
+        let message = format!(
+            "policy {self} takes objects by suction, and the hand of {} has no cup; choose --arm suction",
+            arm.name
+        );
+        Err(Error::Usage(message))
     }
 
     /// The settings with the skills that the policy is about.

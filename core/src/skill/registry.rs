@@ -188,6 +188,7 @@ impl<'de> Deserialize<'de> for SkillSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::skill::Push;
     use serde_json::json;
 
     #[test]

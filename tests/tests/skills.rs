@@ -28,7 +28,7 @@ fn a_drag_runs_is_filed_and_is_repeated_bit_for_bit() {
     let step = &record["steps"][4];
     assert_eq!(step["action"]["kind"], "drag", "{step}");
     assert!(step["action"]["pitch_deg"].is_number() && step["displacement_m"].as_f64().expect("metres") > 0.0);
-    assert!(out.join("recording.rrd").is_file());
+    assert!(out.join("episode.rrd").is_file());
     assert!(nudge_ok(&["replay", text(&out)]).contains("bit for bit"));
 
     // A program that lacks the skill says so in one line.

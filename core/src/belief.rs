@@ -235,7 +235,7 @@ pub trait BeliefUpdate: Send + Sync {
     fn predict(&self, belief: &Belief, interventions: &[Intervention]) -> Vec<Prediction>;
 }
 
-/// Predictions in order: of what is held by this rule, of the rest what `rest` answers.
+/// Predictions in order: what is held moves as a whole (`held`), the rest is what `rest` answers.
 pub(crate) fn predict_held_apart(
     belief: &Belief,
     interventions: &[Intervention],

@@ -158,7 +158,7 @@ impl<'r> Reader<'r> {
             _ => None,
         };
         let radii = link.collisions.iter().filter_map(|collision| radius(&collision.geometry));
-        match radii.fold(None, |widest: Option<f64>, radius| Some(widest.map_or(radius, |widest| widest.max(radius)))) {
+        match radii.reduce(f64::max) {
             Some(radius_m) => Ok(Some(Cup { radius_m })),
             None => self.wrong_link(CUP, "a suction cup has a cylinder as wide as its rim"),
         }

@@ -59,17 +59,17 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
                 decision.action = random_look(situation);
             }
             if (step + 1).is_multiple_of(PUSH_EVERY) {
-                match policy {
-                    PolicyKind::GreedyFrontPick => take_front_most(&mut decision, situation, settings, guard()),
-                    _ => push_at_random(&mut decision, situation, settings, guard()),
-                }
+                push_instead(&mut decision, guard(), || match policy {
+                    PolicyKind::GreedyFrontPick => front_most(situation, settings),
+                    _ => random_push(situation, settings),
+                });
             }
         }
         PolicyKind::Saturation => {
             let previous = history.best_gains.last().copied();
             let current = decision.best_gain().unwrap_or(0.0);
             if previous.is_some_and(|previous| saturated(previous, current, settings.saturation)) {
-                push_at_random(&mut decision, situation, settings, guard());
+                push_instead(&mut decision, guard(), || random_push(situation, settings));
             }
         }
         PolicyKind::Oracle => decision.action = clairvoyant_look(situation),
@@ -139,34 +139,13 @@ fn ruled(decision: &Decision, settings: &PlannerSettings) -> Reason {
     look_or_push(looking, floor, decision.igm, decision.reg, settings.gamma)
 }
 
-/// Replaces the look by a random feasible push, if nothing forbids it and there is one.
-fn push_at_random(
-    decision: &mut Decision,
-    situation: &Situation<'_>,
-    settings: &PlannerSettings,
-    guard: Option<Reason>,
-) {
+/// Replaces the look by the best of what `draw` brings, if nothing forbids it and there is one.
+fn push_instead(decision: &mut Decision, guard: Option<Reason>, draw: impl FnOnce() -> Weighed) {
     if let Some(reason) = guard {
         decision.reason = reason;
         return;
     }
-    if let Some(at) = take_over(decision, random_push(situation, settings)) {
-        decision.action = Action::Manipulate(decision.candidates[at].manipulation);
-    }
-}
-
-/// Replaces the look by the feasible manipulation that touches nearest to the entrance, if nothing forbids it and there is one.
-fn take_front_most(
-    decision: &mut Decision,
-    situation: &Situation<'_>,
-    settings: &PlannerSettings,
-    guard: Option<Reason>,
-) {
-    if let Some(reason) = guard {
-        decision.reason = reason;
-        return;
-    }
-    if let Some(at) = take_over(decision, front_most(situation, settings)) {
+    if let Some(at) = take_over(decision, draw()) {
         decision.action = Action::Manipulate(decision.candidates[at].manipulation);
     }
 }

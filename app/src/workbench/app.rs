@@ -9,6 +9,7 @@ mod take_in;
 mod tests;
 
 use super::browser::Browser;
+use super::changes::{self, Largest};
 use super::command::{Command, Level};
 use super::derive::Derived;
 use super::dialog::Dialog;
@@ -16,6 +17,7 @@ use super::latest::{Latest, Wake};
 use super::model::{GainSource, LayoutKind, Model, Picked, Preview, Remembered};
 use super::part::Part;
 use super::session::{Activity, SessionId};
+use super::space::hit::Ray;
 use super::space::{Drawn, Painter};
 use super::tasks::Tasks;
 use super::threads::Threads;
@@ -115,6 +117,7 @@ struct Background {
     other_maps: Latest<Derived>,
     preview: Latest<Preview>,
     gain: Latest<GainSource>,
+    changes: Latest<(changes::Of, Largest)>,
     space: Latest<()>,
 }
 
@@ -125,12 +128,14 @@ impl Background {
             other_maps: Latest::new("floor maps of the other episode"),
             preview: Latest::new("push preview"),
             gain: Latest::new("gain of a view"),
+            changes: Latest::new("largest changes"),
             space: Latest::new("three-dimensional views"),
         };
         background.maps.wake_with(wake.clone());
         background.other_maps.wake_with(wake.clone());
         background.preview.wake_with(wake.clone());
         background.gain.wake_with(wake.clone());
+        background.changes.wake_with(wake.clone());
         background.space.wake_with(wake.clone());
         background
     }
@@ -140,13 +145,14 @@ impl Background {
             || self.other_maps.is_busy()
             || self.preview.is_busy()
             || self.gain.is_busy()
+            || self.changes.is_busy()
             || self.space.is_busy()
     }
 
     /// Why jobs broke down since the last call.
     fn broke(&self) -> Vec<String> {
         let (maps, views) =
-            ([&self.maps, &self.other_maps], [self.preview.broke(), self.gain.broke(), self.space.broke()]);
+            ([&self.maps, &self.other_maps], [self.preview.broke(), self.gain.broke(), self.changes.broke(), self.space.broke()]);
         maps.into_iter().map(Latest::broke).chain(views).flatten().collect()
     }
 }
@@ -211,11 +217,17 @@ pub struct App {
     begun: BTreeSet<PathBuf>,
     /// The gain that was asked for last: the state and the view.
     asked_gain: Option<((SessionId, usize), ViewId)>,
+    /// The changes that were asked for last.
+    asked_changes: Option<changes::Of>,
     /// The prediction that was asked for last: the state and the push.
     asked_preview: Option<((SessionId, usize), Manipulation)>,
     /// Where the parts of the window were drawn last, points.
     parts: Vec<(Part, egui::Rect)>,
     viewer: Option<Viewer>,
+    /// The ray of a click on the three-dimensional views in this frame.
+    ray: Option<Ray>,
+    /// The voxel that a click was on, until the viewer has told whether something else was meant.
+    pointed: Option<Picked>,
     /// Why there is no viewer.
     no_viewer: Option<String>,
     /// What draws.
@@ -301,8 +313,11 @@ impl App {
             begun: BTreeSet::new(),
             asked_gain: None,
             asked_preview: None,
+            asked_changes: None,
             parts: Vec::new(),
             viewer: None,
+            ray: None,
+            pointed: None,
             no_viewer: None,
             graphics: "none".to_owned(),
             painter: None,

@@ -6,6 +6,7 @@
 
 mod arm;
 pub mod at;
+pub mod hit;
 mod layout;
 mod outlines;
 mod push;
@@ -124,6 +125,11 @@ impl Drawn {
     pub fn voxel(&self, entity: &str, instance: usize) -> Option<usize> {
         let drawn = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         drawn.get(entity)?.get(instance).copied()
+    }
+
+    /// The voxels that are drawn of an entity.
+    pub fn voxels(&self, entity: &str) -> Arc<Vec<usize>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get(entity).cloned().unwrap_or_default()
     }
 
     /// Number of voxels drawn.
@@ -378,9 +384,11 @@ impl Painter {
             };
             self.log(at::HOVERED, &strips);
         }
-        if self.differs(at::PICKED, format!("{:?} {:?}", side.id, space.picked)) {
+        // The mark belongs to the question; other layouts ask another.
+        let picked = space.picked.filter(|_| space.layout == LayoutKind::Why);
+        if self.differs(at::PICKED, format!("{:?} {picked:?}", side.id)) {
             let grid = side.moment.belief.grid();
-            let strips = match space.picked {
+            let strips = match picked {
                 None => rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()),
                 Some(Picked::Voxel(index)) => box_edges(grid, index..index + 1),
                 Some(Picked::Cell(cell)) => box_edges(grid, grid.column(cell)),

@@ -5,9 +5,12 @@
 //! clicks on comes back through [`Viewer::clicked`].
 
 mod linked;
+mod sight;
 
 use re_viewer::external::re_ui::{RecordingCommand, RecordingCommandKind, RecordingCommandSender as _};
+use re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
 use re_viewer::external::{eframe, egui, re_log_channel, re_log_types, tokio};
+use super::space::hit::Ray;
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
 use rerun::grpc_server::GrpcServerSink;
 use rerun::sink::LogSink as _;
@@ -74,8 +77,10 @@ impl Viewer {
         options.panel_state_overrides.time = Some(PanelState::Hidden);
         let heard = clicked.clone();
         options.on_event = Some(Rc::new(move |event: re_viewer::ViewerEvent| {
-            if let re_viewer::ViewerEventKind::SelectionChange { items } = event.kind {
-                *heard.borrow_mut() = items.iter().find_map(clicked_of);
+            if let re_viewer::ViewerEventKind::SelectionChange { items } = event.kind
+                && let Some(clicked) = items.iter().find_map(clicked_of)
+            {
+                *heard.borrow_mut() = Some(clicked);
             }
         }));
         // The viewer takes the space bar, arrows, Home and End as soon as a frame begins. Around its hook, so in the order
@@ -147,9 +152,19 @@ impl Viewer {
         ui.input_mut(|input| input.events = before);
     }
 
-    /// What was clicked on since the last call.
+    /// What was clicked on since the last call, as the viewer tells it.
     pub fn clicked(&mut self) -> Option<Clicked> {
-        self.clicked.borrow_mut().take()
+        let clicked = self.clicked.borrow_mut().take();
+        if clicked.is_some() && !self.is_foreign.load(Ordering::Relaxed) {
+            // It tells of changes alone: what stays selected could not be clicked again, and would keep its outline.
+            self.app.command_sender.send_system(SystemCommand::clear_selection());
+        }
+        clicked
+    }
+
+    /// The ray that a click in this frame follows, if it was on one of the window's own views inside `space`.
+    pub fn clicked_ray(&self, ctx: &egui::Context, space: egui::Rect) -> Option<Ray> {
+        if self.is_foreign.load(Ordering::Relaxed) { None } else { sight::clicked(ctx, space) }
     }
 
     /// Shows a recording in place of the window's own.
@@ -176,7 +191,6 @@ impl Viewer {
     pub fn close_recording(&mut self) {
         self.is_foreign.store(false, Ordering::Relaxed);
         self.asked = None;
-        use re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
         let own = re_log_types::ApplicationId::from(APPLICATION);
         self.app.command_sender.send_system(SystemCommand::ActivateApp(own));
     }

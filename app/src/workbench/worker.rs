@@ -3,14 +3,16 @@
 //! The window never waits for it while it is open; [`super::threads`] waits once it is closed. A panic inside an order becomes an [`Event::Panicked`]; what was written to the
 //! episode's directory until then is whole.
 
+use super::filed;
 use super::half_belief::HalfBelief;
 use super::latest::words_of;
+use super::packed_frame::PackedFrame;
 use super::session::{Activity, Moment, SessionId, Setup};
 use super::threads::Threads;
 use crate::driver::{Driver, update_of};
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::camera::{ViewArray, hidden_objects};
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Overwrite, StepOutcome, review};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, Frames, Overwrite, StepOutcome, review};
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
 use nudge_core::{Error, Result};
@@ -76,6 +78,12 @@ impl Begin {
 pub enum Event {
     /// The episode is there.
     Opened(Box<Opened>),
+    /// A state of the opened episode with all that repeating its action brought.
+    Repeated(Arc<Moment>),
+    /// The log of the opened episode is repeated.
+    Checked(Box<Checked>),
+    /// The log of the opened episode cannot be repeated, for a reason that is no other version, machine or network's.
+    Unchecked(String),
     /// What it is at.
     Activity(Activity),
     /// What the policy would do.
@@ -102,6 +110,16 @@ pub struct Opened {
     pub read_only: Option<String>,
 }
 
+/// What repeating the log of an opened episode brought, beside its states.
+pub struct Checked {
+    /// Scene, configuration, steps.
+    pub record: EpisodeRecord,
+    /// What does not change.
+    pub setup: Setup,
+    /// Why nothing more can be done with it, if it can only be looked at.
+    pub read_only: Option<String>,
+}
+
 pub use super::latest::Wake;
 
 /// What stops a worker before it has done all that it was told.
@@ -109,6 +127,8 @@ pub use super::latest::Wake;
 struct Brake {
     /// Stop after the action that is under way.
     paused: AtomicBool,
+    /// Leave the orders that are in line.
+    forgotten: AtomicBool,
     /// Stop as soon as can be; what has been decided is not done.
     cancelled: AtomicBool,
 }
@@ -150,9 +170,10 @@ impl Worker {
             .name(format!("episode {}", id.0))
             .spawn(move || {
                 before.into_iter().for_each(|thread| drop(thread.join()));
-                let broke = catch_unwind(AssertUnwindSafe(|| work(begin, catalog, &inbox, &post, &own)));
-                if let Err(panic) = broke {
-                    post.send(Event::Panicked(words_of(&*panic)));
+                let told = post.clone();
+                let work = AssertUnwindSafe(move || work(begin, catalog, &inbox, &post, &own));
+                if let Err(panic) = catch_unwind(move || beside_the_window(work)) {
+                    told.send(Event::Panicked(words_of(&*panic)));
                 }
             })
             .expect("a thread can be started");
@@ -164,12 +185,18 @@ impl Worker {
     pub fn order(&self, order: Order) {
         self.brake.paused.store(false, Ordering::Relaxed);
         self.brake.cancelled.store(false, Ordering::Relaxed);
+        self.brake.forgotten.store(false, Ordering::Relaxed);
         let _ = self.orders.send(order);
     }
 
     /// Stops a run after the action that it is at.
     pub fn pause(&self) {
         self.brake.paused.store(true, Ordering::Relaxed);
+    }
+
+    /// Leaves the orders that wait behind the check of a log.
+    pub fn forget(&self) {
+        self.brake.forgotten.store(true, Ordering::Relaxed);
     }
 
     /// Stops a run without doing what it decides just now, or an opening.
@@ -184,6 +211,17 @@ impl Drop for Worker {
     }
 }
 
+/// Does an episode's work on all cores but one, which is the window's.
+fn beside_the_window(work: impl FnOnce() + Send) {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    match rayon::ThreadPoolBuilder::new().num_threads(cores.saturating_sub(1).max(1)).build() {
+        Ok(pool) => pool.install(work),
+        // Without threads of its own it shares everybody's.
+        Err(_) => work(),
+    }
+}
+
+#[derive(Clone)]
 struct Post {
     id: SessionId,
     events: Sender<(SessionId, Event)>,
@@ -205,16 +243,19 @@ enum Track {
 }
 
 fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Post, brake: &Brake) {
-    let (mut track, mut latest) = match open(begin, catalog, post, brake) {
-        Ok((track, opened)) => {
-            let latest = opened.moments.last().expect("there is a prior").clone();
-            post.send(Event::Opened(Box::new(opened)));
-            (track, latest)
-        }
+    let begun = match begin {
+        Begin::Open { path, look_only } => reopen(&path, look_only, catalog, post, brake),
+        begin => begin_anew(begin, catalog, post, brake),
+    };
+    let (mut track, mut latest) = match begun {
+        Ok(begun) => begun,
         Err(error) => return post.send(Event::Failed(error.to_string())),
     };
     post.send(Event::Activity(Activity::Idle));
     while let Ok(order) = inbox.recv() {
+        if brake.forgotten.load(Ordering::Relaxed) {
+            continue;
+        }
         let Track::Writing(driver) = &mut track else {
             post.send(Event::Failed("this episode is read only; branch from it to continue".to_owned()));
             continue;
@@ -267,7 +308,8 @@ fn act(driver: &mut Driver, decision: Decision, latest: &mut Arc<Moment>, post: 
 }
 
 /// The state of an episode and what led to it; what has not changed since `before` is shared with it.
-fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Moment>) -> Moment {
+fn moment(episode: &Episode, mut outcome: Option<StepOutcome>, before: Option<&Moment>) -> Moment {
+    let frame = PackedFrame::taken_from(outcome.as_mut());
     let pushed = outcome.as_ref().is_none_or(|outcome| matches!(outcome.record.action, Action::Manipulate(_)));
     let shared = before.filter(|_| !pushed);
     Moment {
@@ -284,128 +326,168 @@ fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Momen
             .as_ref()
             .map_or(episode.record().prior.entropy_nats, |outcome| outcome.record.entropy_nats),
         outcome: outcome.map(Arc::new),
+        frame,
+        is_whole: true,
     }
 }
 
-fn update_named(name: &str, config: &EpisodeConfig) -> Result<Arc<dyn BeliefUpdate>> {
-    crate::driver::belief_update(Some(name), config.policy)
+/// Starts an episode, or one that shares the first steps of another.
+fn begin_anew(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Result<(Track, Arc<Moment>)> {
+    let (scene, config, steps, out) = match begin {
+        Begin::Start { scene, config, out } => (*scene, *config, Vec::new(), out),
+        Begin::Branch { of, steps, out } => {
+            let shared: Vec<_> = of.steps.into_iter().take(steps).collect();
+            (of.scene, of.config, shared, out)
+        }
+        Begin::Open { .. } => unreachable!("what is there already is reopened"),
+    };
+    let update = crate::driver::belief_update(Some(&config.belief), config.policy)?;
+    let mut driver = Driver::start(scene, catalog, config, update.clone(), &out, Overwrite::Refuse, Frames::Filed)?;
+    let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
+    let shared = steps.len();
+    for (done, step) in steps.into_iter().enumerate() {
+        go_on(brake)?;
+        post.send(Event::Activity(Activity::Opening { done, of: shared }));
+        let outcome = driver.act(step.decision)?;
+        let next = moment(driver.episode(), Some(outcome), moments.last().map(|moment| &**moment));
+        moments.push(Arc::new(next));
+    }
+    let latest = moments[moments.len() - 1].clone();
+    let (record, setup) = (driver.episode().record().clone(), setup(driver.episode(), Some(update), &moments[0])?);
+    post.send(Event::Opened(Box::new(Opened { path: out, record, setup, moments, read_only: None })));
+    Ok((Track::Writing(Box::new(driver)), latest))
 }
 
-fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Result<(Track, Opened)> {
-    match begin {
-        Begin::Start { scene, config, out } => {
-            let update = update_named(&config.belief, &config)?;
-            let driver =
-                Driver::start(*scene, catalog, *config, update.clone(), &out, Overwrite::Refuse, Frames::Filed)?;
-            let moments = vec![Arc::new(moment(driver.episode(), None, None))];
-            let opened = opened(&out, driver.episode(), Some(update), moments, None)?;
-            Ok((Track::Writing(Box::new(driver)), opened))
+/// Shows an episode as its files hold it, and then repeats its log: to go on with it, or, where that cannot be, to bring what
+/// the files do not hold.
+fn reopen(
+    path: &Path,
+    look_only: bool,
+    catalog: Arc<Catalog>,
+    post: &Post,
+    brake: &Brake,
+) -> Result<(Track, Arc<Moment>)> {
+    let filed = filed::open(path, catalog.clone())?;
+    let record = filed.record.clone();
+    let mut states = States { post, brake, of: record.steps.len(), first: None, latest: None };
+    post.send(Event::Opened(Box::new(filed)));
+    let (track, checked) = match check(path, &record, look_only, catalog, &mut states) {
+        Ok(checked) => checked,
+        Err(error) if brake.is_cancelled() => return Err(error),
+        Err(error) => {
+            // It is in sight as its files hold it, and stays so.
+            post.send(Event::Unchecked(error.to_string()));
+            let latest = states.latest.take().ok_or(error)?;
+            return Ok((Track::Reading, latest));
         }
-        Begin::Branch { of, steps, out } => {
-            let update = update_named(&of.config.belief, &of.config)?;
-            let mut driver =
-                Driver::start(of.scene, catalog, of.config, update.clone(), &out, Overwrite::Refuse, Frames::Filed)?;
-            let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
-            for (done, step) in of.steps.into_iter().take(steps).enumerate() {
-                progress(post, brake, done, steps)?;
-                let outcome = driver.act(step.decision)?;
-                let next = moment(driver.episode(), Some(outcome), moments.last().map(|moment| &**moment));
-                moments.push(Arc::new(next));
-            }
-            let opened = opened(&out, driver.episode(), Some(update), moments, None)?;
-            Ok((Track::Writing(Box::new(driver)), opened))
-        }
-        Begin::Open { path, look_only } => {
-            let record = EpisodeDir::open(&path)?.record()?;
-            let of = record.steps.len();
-            let look = |update: Option<Arc<dyn BeliefUpdate>>, why: String| {
-                let mut moments = Vec::with_capacity(of + 1);
-                let mut watch = watch(post, brake, of, &mut moments);
-                let (episode, difference) = review(&path, catalog.clone(), update.clone(), &mut watch)?;
-                drop(watch);
-                let reason = difference.map_or(why, |difference| {
-                    format!("repeating its actions gives another result here ({difference}); shown is what it holds")
-                });
-                Ok((Track::Reading, opened(&path, &episode, update, moments, Some(reason))?))
-            };
-            // Networks that are not here, cannot be read, or have other weights than those that made it.
-            let update = match update_of(&record.config.belief) {
-                Ok(Ok(update)) => match record.other_weights(&*update) {
-                    None => update,
-                    Some(words) => return look(None, format!("{words}; {HELD}")),
-                },
-                Ok(Err(why)) => return look(None, format!("{why}; {HELD}")),
-                Err(error) => return look(None, format!("{error}; {HELD}")),
-            };
-            if look_only {
-                return look(Some(update), "nothing in its directory shall change".to_owned());
-            }
-            let mut moments = Vec::with_capacity(of + 1);
-            let resumed =
-                Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, brake, of, &mut moments));
+    };
+    let latest = states.latest.take().ok_or_else(|| Error::input(path, "", "holds no prior"))?;
+    post.send(Event::Checked(Box::new(checked)));
+    Ok((track, latest))
+}
+
+/// Repeats the log of an episode, on and on if it can be gone on with.
+fn check(
+    path: &Path,
+    record: &EpisodeRecord,
+    look_only: bool,
+    catalog: Arc<Catalog>,
+    states: &mut States<'_>,
+) -> Result<(Track, Checked)> {
+    // Networks that are not here, cannot be read, or have other weights than those that made it.
+    let (update, hindrance) = match update_of(&record.config.belief) {
+        Ok(Ok(update)) => match record.other_weights(&*update) {
+            None => (Some(update), None),
+            Some(words) => (None, Some(format!("{words}; {HELD}"))),
+        },
+        Ok(Err(why)) => (None, Some(format!("{why}; {HELD}"))),
+        Err(error) => (None, Some(format!("{error}; {HELD}"))),
+    };
+    let hindrance = hindrance.or_else(|| look_only.then(|| "nothing in its directory shall change".to_owned()));
+    let refused = match (&update, hindrance) {
+        (Some(update), None) => {
+            let resumed = Driver::resume(path, catalog.clone(), update.clone(), &mut |episode, outcome| {
+                states.take(episode, outcome)
+            });
             match resumed {
                 Ok(driver) => {
-                    let opened = opened(&path, driver.episode(), Some(update), moments, None)?;
-                    Ok((Track::Writing(Box::new(driver)), opened))
+                    let checked = states.checked(driver.episode(), Some(update.clone()), None)?;
+                    return Ok((Track::Writing(Box::new(driver)), checked));
                 }
                 // What cannot be written, is being written by another run, or is of another version or machine.
-                Err(refused @ (Error::Io { .. } | Error::Input { .. } | Error::Check(_))) => {
-                    look(Some(update), refused.to_string())
-                }
-                Err(error) => Err(error),
+                Err(refused @ (Error::Io { .. } | Error::Input { .. } | Error::Check(_))) => refused.to_string(),
+                Err(error) => return Err(error),
             }
         }
-    }
+        (_, hindrance) => hindrance.unwrap_or_default(),
+    };
+    let (episode, difference) =
+        review(path, catalog, update.clone(), &mut |episode, outcome| states.take(episode, outcome))?;
+    let reason = difference.map_or(refused, |difference| {
+        format!("repeating its actions gives another result here ({difference}); shown is what it holds")
+    });
+    Ok((Track::Reading, states.checked(&episode, update, Some(reason))?))
 }
 
 /// What an episode lacks whose belief update is not here.
 const HELD: &str =
     "shown is what it holds: pushes are not predicted, and after one every voxel counts as unseen in Gains";
 
-/// Keeps every state of an episode that is being repeated, and tells how far it is.
-fn watch<'a>(
+/// The states of an episode that is being repeated, sent one by one.
+struct States<'a> {
     post: &'a Post,
     brake: &'a Brake,
     of: usize,
-    moments: &'a mut Vec<Arc<Moment>>,
-) -> impl FnMut(&Episode, Option<&StepOutcome>) -> Result<()> + 'a {
-    move |episode, outcome| {
-        progress(post, brake, episode.record().steps.len(), of)?;
-        let next = moment(episode, outcome.cloned(), moments.last().map(|moment| &**moment));
-        moments.push(Arc::new(next));
+    first: Option<Arc<Moment>>,
+    latest: Option<Arc<Moment>>,
+}
+
+impl States<'_> {
+    fn take(&mut self, episode: &Episode, outcome: Option<&StepOutcome>) -> Result<()> {
+        go_on(self.brake)?;
+        let done = episode.record().steps.len();
+        let before = self.latest.take().filter(|_| outcome.is_some());
+        let next = Arc::new(moment(episode, outcome.cloned(), before.as_deref()));
+        if done == 0 {
+            self.first = Some(next.clone());
+        }
+        self.latest = Some(next.clone());
+        self.post.send(Event::Repeated(next));
+        self.post.send(Event::Activity(Activity::Checking { done, of: self.of }));
         Ok(())
     }
-}
 
-fn progress(post: &Post, brake: &Brake, done: usize, of: usize) -> Result<()> {
-    if brake.is_cancelled() {
-        return Err(Error::Usage("cancelled".to_owned()));
+    fn checked(
+        &self,
+        episode: &Episode,
+        update: Option<Arc<dyn BeliefUpdate>>,
+        read_only: Option<String>,
+    ) -> Result<Checked> {
+        let first = self.first.as_ref().ok_or_else(|| Error::Usage("there is no prior".to_owned()))?;
+        Ok(Checked { record: episode.record().clone(), setup: setup(episode, update, first)?, read_only })
     }
-    post.send(Event::Activity(Activity::Opening { done, of }));
-    Ok(())
 }
 
-fn opened(
-    path: &Path,
-    episode: &Episode,
-    update: Option<Arc<dyn BeliefUpdate>>,
-    moments: Vec<Arc<Moment>>,
-    read_only: Option<String>,
-) -> Result<Opened> {
-    let record = episode.record().clone();
+/// Refuses to go on once nobody waits any more.
+fn go_on(brake: &Brake) -> Result<()> {
+    if brake.is_cancelled() { Err(Error::Usage("cancelled".to_owned())) } else { Ok(()) }
+}
+
+/// What does not change in an episode that began with `first`.
+fn setup(episode: &Episode, update: Option<Arc<dyn BeliefUpdate>>, first: &Moment) -> Result<Setup> {
+    let record = episode.record();
     let views = ViewArray::named(&record.config.views)?;
-    let hidden = hidden_objects(&record.scene.shelf, &moments[0].bodies, &views);
+    let hidden = hidden_objects(&record.scene.shelf, &first.bodies, &views);
     let name = |id: &ObjectId| {
         let object = record.scene.objects.get(usize::from(id.0));
         format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
     };
-    let setup = Setup {
+    Ok(Setup {
         catalog: Arc::new(episode.catalog().clone()),
         views: Arc::new(views),
         update,
         arm: episode.arm().clone(),
         unreachable: Arc::new(episode.unreachable_views().to_vec()),
-        hidden: Arc::new(hidden.iter().map(name).collect()),
-    };
-    Ok(Opened { path: path.to_owned(), record, setup, moments, read_only })
+        hidden: Some(Arc::new(hidden.iter().map(name).collect())),
+    })
 }

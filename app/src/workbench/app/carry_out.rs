@@ -1,10 +1,11 @@
 //! What is done with the commands that panels, menus and shortcuts give.
 
 use super::{App, ChosenFor, Kept, Opening, Pair};
+use crate::workbench::changes;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::{Dialog, Reply};
 use crate::workbench::model::{GainSource, LayoutKind, Preview};
-use crate::workbench::panels::weighed;
+use crate::workbench::panels::{causes, weighed};
 use crate::workbench::session::{Activity, Session, SessionId, branch_suffix};
 use crate::workbench::worker::{Begin, Order, Worker};
 use nudge_core::camera::ViewId;
@@ -310,13 +311,18 @@ impl App {
         if session.read_only.is_some() {
             return Err((Level::Warning, "This episode is read only; branch from it to continue"));
         }
-        if session.activity != Activity::Idle {
-            return Err((Level::Info, "The episode is busy; cancel first"));
-        }
         if session.is_finished() {
             return Err((Level::Info, "The budget is used up; branch from an earlier step to continue"));
         }
-        session.activity = activity;
+        match session.activity {
+            Activity::Idle => session.activity = activity,
+            // What was decided before holds for what was filed; a decision or a run can wait for the check.
+            Activity::Checking { .. } if session.takes_orders() && matches!(order, Order::Decide | Order::Run) => {
+                session.queued = true;
+            }
+            Activity::Checking { .. } => return Err((Level::Info, "Its log is still being checked; wait for that")),
+            _ => return Err((Level::Info, "The episode is busy; cancel first")),
+        }
         worker.order(order);
         Ok(())
     }
@@ -347,7 +353,18 @@ impl App {
     /// Puts the brake on what is on the window.
     fn stop(&mut self, brake: impl Fn(&Worker)) {
         let shown: Vec<SessionId> = self.model.on_show().map(|session| session.id).collect();
-        shown.iter().filter_map(|id| self.workers.get(id)).for_each(brake);
+        for id in shown {
+            // The check of a log goes on; what waits behind it is left.
+            let checks = self.model.session_of(id).map(|session| matches!(session.activity, Activity::Checking { .. }));
+            match self.workers.get(&id) {
+                Some(worker) if checks == Some(true) => worker.forget(),
+                Some(worker) => brake(worker),
+                None => {}
+            }
+            if let Some(session) = self.model.session_of_mut(id) {
+                session.queued = false;
+            }
+        }
     }
 
     fn cancel(&mut self) {
@@ -376,8 +393,9 @@ impl App {
         let Some(session) = self.model.session() else { return };
         let moment = session.moment(self.model.cursor).clone();
         let (of, setup) = ((session.id, moment.step), session.setup.clone());
-        self.asked_preview = Some((of, manipulation));
+        // Without networks there is no answer; of an episode that is still being checked it is asked again.
         let Some(update) = setup.update.clone() else { return };
+        self.asked_preview = Some((of, manipulation));
         self.background.preview.ask(move |_| {
             let belief = moment.belief.belief();
             let intervention = intended(&setup.arm, &belief, &manipulation);
@@ -393,6 +411,10 @@ impl App {
         let moment = session.moment(self.model.cursor).clone();
         let (of, views) = ((session.id, moment.step), session.setup.views.clone());
         let counted = session.record.config.planner.counted;
+        // What was seen is not known of a state that is still being repeated.
+        if !moment.is_whole {
+            return;
+        }
         self.asked_gain = Some((of, view));
         self.background.gain.ask(move |_| {
             let gain = Gain::new(counted, &moment.belief.belief(), &moment.seen);
@@ -409,6 +431,24 @@ impl App {
         {
             self.gain_of(view);
         }
+    }
+
+    /// In Why, asks what the step at the cursor changed most.
+    pub(super) fn follow_changes(&mut self) {
+        let Some(session) = self.model.session().filter(|_| self.model.kept.layout == LayoutKind::Why) else { return };
+        let step = self.model.cursor.min(session.steps());
+        let Some(before) = step.checked_sub(1).map(|before| session.moment(before).clone()) else { return };
+        let after = session.moment(step).clone();
+        let of = (session.id, step, after.is_whole);
+        if self.asked_changes == Some(of) {
+            return;
+        }
+        self.asked_changes = Some(of);
+        let (catalog, belief) = (session.setup.catalog.clone(), session.record.config.belief.clone());
+        self.background.changes.ask(move |_| {
+            let cause = |picked| causes::of_step(&catalog, &belief, [&before, &after], picked);
+            Some((of, changes::largest(&before, &after, cause)))
+        });
     }
 
     /// In the layout of pushes, chooses the push of the decision at the cursor where none is chosen, and asks what the chosen

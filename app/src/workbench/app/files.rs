@@ -241,6 +241,9 @@ impl App {
     }
 
     fn export(&mut self, what: MenuCommand, session: Session, path: PathBuf) {
+        if session.moments.iter().any(|moment| !moment.is_whole) {
+            return self.tell(Level::Warning, "Its log is still being checked; export it once that is done");
+        }
         let title = format!("Exporting to {}", path.display());
         self.task(title, move |watch| {
             let written = if what == MenuCommand::ExportTables {

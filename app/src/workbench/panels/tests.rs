@@ -22,7 +22,7 @@ const PANELS: [(&str, Make); 8] = [
     ("camera", || Box::new(camera::State::default())),
     ("curves", || Box::new(curves::show)),
     ("decision", || Box::new(decision::State::default())),
-    ("why", || Box::new(why::show)),
+    ("why", || Box::<why::State>::default()),
     ("gains", || Box::new(gains::State::default())),
     ("push", || Box::new(push::State::default())),
     ("compare", || Box::new(compare::State::default())),
@@ -260,7 +260,7 @@ fn why_tells_the_causes_of_a_swept_voxel() {
     let swept = &outcome.swept.as_ref().expect("step 4 is a push").swept;
     let voxel = swept.iter().nth(swept.len() / 2).expect("sweeps something");
     model.picked = Some(Picked::Voxel(voxel));
-    let mut harness = harness(why::show, model);
+    let mut harness = harness(why::State::default(), model);
     assert!(has(&harness, "Voxel at") && has(&harness, "step 4, push: swept"));
     harness.query_all_by_label_contains("step 4, push: swept").next().expect("cause").click();
     harness.run_steps(2);
@@ -291,7 +291,7 @@ fn why_tells_of_a_change_that_a_network_made_without_seeing() {
     let belief = crate::workbench::half_belief::HalfBelief::of(&belief);
     model.sessions[0].moments[2] = Arc::new(Moment { belief, ..(*moment).clone() });
     model.picked = Some(Picked::Voxel(voxel));
-    let harness = harness(why::show, model);
+    let harness = harness(why::State::default(), model);
     assert!(has(&harness, &format!("step 2, look from view {}: network, not seen", view.0)));
     assert!(has(&harness, "→ 0.80"));
 }
@@ -304,7 +304,7 @@ fn why_names_the_label_that_a_cell_was_given() {
     let cell = labels.iter().position(|label| *label < 14).expect("something was seen");
     let name = crate::colors::class_title(&model.sessions[0].setup.catalog, nudge_core::scene::ClassId(labels[cell]));
     model.picked = Some(Picked::Cell(cell));
-    let harness = harness(why::show, model);
+    let harness = harness(why::State::default(), model);
     assert!(has(&harness, "Floor cell at") && has(&harness, &format!("labelled {name}")));
 }
 

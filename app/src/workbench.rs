@@ -28,6 +28,7 @@ pub mod packed_frame;
 pub mod panels;
 pub mod part;
 pub mod picked;
+pub mod ray;
 pub mod recording_file;
 pub mod session;
 pub mod shot;

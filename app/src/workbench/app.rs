@@ -3,6 +3,7 @@
 mod carry_out;
 mod draw;
 mod files;
+mod follow;
 mod shown;
 mod take_in;
 #[cfg(test)]
@@ -10,14 +11,14 @@ mod tests;
 
 use super::browser::Browser;
 use super::changes::{self, Largest};
-use super::command::{Command, Level};
+use super::command::{Command, Level, MenuCommand};
 use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};
 use super::model::{GainSource, LayoutKind, Model, Picked, Preview, Remembered};
 use super::part::Part;
+use super::ray::Ray;
 use super::session::{Activity, SessionId};
-use super::space::hit::Ray;
 use super::space::{Drawn, Painter};
 use super::tasks::Tasks;
 use super::threads::Threads;
@@ -151,10 +152,20 @@ impl Background {
 
     /// Why jobs broke down since the last call.
     fn broke(&self) -> Vec<String> {
-        let (maps, views) =
-            ([&self.maps, &self.other_maps], [self.preview.broke(), self.gain.broke(), self.changes.broke(), self.space.broke()]);
+        let (maps, views) = (
+            [&self.maps, &self.other_maps],
+            [self.preview.broke(), self.gain.broke(), self.changes.broke(), self.space.broke()],
+        );
         maps.into_iter().map(Latest::broke).chain(views).flatten().collect()
     }
+}
+
+/// What became of a file dialog.
+enum Chosen {
+    /// A path was chosen.
+    Path(ChosenFor, PathBuf),
+    /// The system has no such dialog.
+    NoDialog(ChosenFor, MenuCommand),
 }
 
 /// What a file dialog was opened for.
@@ -209,7 +220,7 @@ pub struct App {
     openings: BTreeMap<SessionId, Opening>,
     events: Channel<(SessionId, Event)>,
     /// Paths that were chosen in the system's dialogs.
-    chosen: Channel<(ChosenFor, PathBuf)>,
+    chosen: Channel<Chosen>,
     background: Background,
     tasks: Tasks,
     pairs: Vec<Pair>,
@@ -381,6 +392,11 @@ impl App {
     /// An open question in front of everything else.
     pub fn dialog(&self) -> Option<&Dialog> {
         self.dialog.as_ref()
+    }
+
+    /// Where a part of the window was drawn last, points.
+    pub fn place_of(&self, part: Part) -> Option<egui::Rect> {
+        self.parts.iter().find(|(of, _)| *of == part).map(|(_, rect)| *rect)
     }
 
     /// Voxels of the belief that are drawn in three dimensions.

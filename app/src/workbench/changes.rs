@@ -103,12 +103,16 @@ mod tests {
             let cause = |of| causes::of_step(&session.setup.catalog, CLASSICAL, [before, after], of);
             let found = largest(before, after, cause);
             let full = [before, after].map(|moment| moment.belief.belief());
-            let sizes = (0..full[0].occupancy.len()).map(|voxel| (full[1].probability(voxel) - full[0].probability(voxel)).abs());
+            let sizes = (0..full[0].occupancy.len())
+                .map(|voxel| (full[1].probability(voxel) - full[0].probability(voxel)).abs());
             let top = sizes.fold(0.0, f32::max);
             assert!(top <= CHANGED || found.voxels[0].change().abs() == top, "step {step}");
             for list in [&found.voxels, &found.cells] {
                 assert!(list.len() <= LISTED && list.is_sorted_by(|a, b| a.change().abs() >= b.change().abs()));
-                assert!(list.iter().all(|change| change.change().abs() > CHANGED && !change.cause.is_empty()), "step {step}");
+                assert!(
+                    list.iter().all(|change| change.change().abs() > CHANGED && !change.cause.is_empty()),
+                    "step {step}"
+                );
             }
         }
     }

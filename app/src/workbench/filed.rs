@@ -3,7 +3,7 @@
 use super::half_belief::HalfBelief;
 use super::packed_frame::PackedFrame;
 use super::session::{Moment, Setup};
-use super::worker::Opened;
+use super::worker::told::Opened;
 use nudge_core::Result;
 use nudge_core::arm::{Arm, ArmTool};
 use nudge_core::camera::{NoiseModel, ViewArray};

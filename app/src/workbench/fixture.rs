@@ -2,8 +2,8 @@
 
 use super::derive::Derived;
 use super::half_belief::HalfBelief;
-use super::packed_frame::PackedFrame;
 use super::model::{GainSource, Model, Preview};
+use super::packed_frame::PackedFrame;
 use super::session::{Activity, Moment, Session, SessionId, Setup};
 use nudge_core::belief::{BeliefUpdate, Classical};
 use nudge_core::camera::ViewId;
@@ -124,6 +124,7 @@ impl Played {
             pending: self.pending.clone(),
             activity: Activity::Idle,
             queued: false,
+            pausing: false,
             read_only: None,
             annotations: super::annotations::Annotations::default(),
             unsaved: false,

@@ -79,7 +79,12 @@ mod tests {
         for moment in &session.moments {
             let grid = moment.belief.grid();
             let plain = 2 * (2 * grid.voxel_count() + CLASS_COUNT * grid.cell_count());
-            assert!(4 * moment.belief.bytes() <= plain, "step {}: {} of {plain} bytes", moment.step, moment.belief.bytes());
+            assert!(
+                4 * moment.belief.bytes() <= plain,
+                "step {}: {} of {plain} bytes",
+                moment.step,
+                moment.belief.bytes()
+            );
         }
     }
 }

@@ -208,7 +208,9 @@ impl M {
                 let other = model.other_session().filter(|_| session.is_some());
                 other.is_some_and(|other| other.takes_orders() || orders)
             }
-            M::Pause => session.is_some() && model.runs_any(|session| session.activity == Activity::Running),
+            M::Pause => {
+                session.is_some() && model.runs_any(|session| session.activity == Activity::Running && !session.pausing)
+            }
             M::Cancel => session.is_some() && model.runs_any(Session::can_be_cancelled),
             M::Branch => session.is_some(),
             M::EditScene => model.session().is_some(),

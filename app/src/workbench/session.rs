@@ -160,6 +160,8 @@ pub struct Session {
     pub queued: bool,
     /// Why nothing more can be done with it, if it can only be looked at.
     pub read_only: Option<String>,
+    /// Whether its run ends after the action that it is at.
+    pub pausing: bool,
     /// Notes and verdicts of a person.
     pub annotations: Annotations,
     /// Whether something has changed since it was last saved.

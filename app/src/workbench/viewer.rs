@@ -7,10 +7,10 @@
 mod linked;
 mod sight;
 
+use super::ray::Ray;
 use re_viewer::external::re_ui::{RecordingCommand, RecordingCommandKind, RecordingCommandSender as _};
 use re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
 use re_viewer::external::{eframe, egui, re_log_channel, re_log_types, tokio};
-use super::space::hit::Ray;
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
 use rerun::grpc_server::GrpcServerSink;
 use rerun::sink::LogSink as _;

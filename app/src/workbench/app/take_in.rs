@@ -1,15 +1,15 @@
 //! What comes in every frame: events of workers, answers of jobs, clicks in the viewer, keys, dropped files.
 
-use super::{App, ChosenFor};
+use super::{App, Chosen, ChosenFor};
 use crate::workbench::annotations::Annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::derive::Derived;
 use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, Picked};
 use crate::workbench::part::Part;
+use crate::workbench::ray::Ray;
 use crate::workbench::session::{Activity, Session, SessionId};
-use crate::workbench::space::hit::{self, Ray};
-use crate::workbench::space::{Side, Space, at};
+use crate::workbench::space::{Side, Space, at, hit};
 use crate::workbench::viewer::{Clicked, Viewer};
 use crate::workbench::worker::{Checked, Event, Opened};
 use re_viewer::external::egui;
@@ -65,6 +65,7 @@ impl App {
                     opening.activity = activity;
                 } else if let Some(session) = self.model.session_of_mut(id) {
                     session.queued &= matches!(activity, Activity::Checking { .. });
+                    session.pausing &= activity != Activity::Idle;
                     session.activity = activity;
                 }
             }
@@ -148,6 +149,7 @@ impl App {
             pending: opening.as_ref().and_then(|opening| opening.kept.as_ref()?.decision.clone()),
             activity,
             queued: false,
+            pausing: false,
             read_only: opened.read_only,
             annotations,
             unsaved: false,
@@ -184,11 +186,18 @@ impl App {
         for (level, words) in self.tasks.ended() {
             self.model.toasts.tell(level, words);
         }
-        while let Ok((purpose, path)) = self.chosen.1.try_recv() {
-            match (purpose, &mut self.dialog) {
-                (ChosenFor::Opening, _) => self.carry_out(Command::Open(path)),
-                (ChosenFor::Dialog, Some(dialog)) => dialog.chosen(&path),
-                (ChosenFor::Dialog, None) => {}
+        while let Ok(chosen) = self.chosen.1.try_recv() {
+            match (chosen, &mut self.dialog) {
+                (Chosen::Path(ChosenFor::Opening, path), _) => self.carry_out(Command::Open(path)),
+                (Chosen::Path(ChosenFor::Dialog, path), Some(dialog)) => dialog.chosen(&path),
+                (Chosen::Path(ChosenFor::Dialog, _), None) => {}
+                (Chosen::NoDialog(ChosenFor::Opening, what), _) => {
+                    self.dialog = Some(Dialog::OpenPath { what, path: String::new() });
+                }
+                (Chosen::NoDialog(ChosenFor::Dialog, _), _) => {
+                    let words = "No file dialog of the system answered here: type the path";
+                    self.model.toasts.tell(Level::Warning, words);
+                }
             }
         }
     }

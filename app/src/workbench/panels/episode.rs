@@ -115,6 +115,7 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
         Activity::Checking { .. } => "checking",
         Activity::Deciding => "deciding…",
         Activity::Acting => "acting…",
+        Activity::Running if session.pausing => "pauses after this action",
         Activity::Running => "running…",
     };
     let words = format!("{steps} of {budget} actions · {doing}");

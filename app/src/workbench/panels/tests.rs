@@ -297,6 +297,82 @@ fn why_tells_of_a_change_that_a_network_made_without_seeing() {
 }
 
 #[test]
+fn the_largest_changes_of_a_step_are_sorted_and_clicked() {
+    let mut model = fixture::model();
+    let session = &model.sessions[0];
+    let (before, after) = (&session.moments[1], &session.moments[2]);
+    let cause =
+        |picked| causes::of_step(&session.setup.catalog, &session.record.config.belief, [before, after], picked);
+    let largest = crate::workbench::changes::largest(before, after, cause);
+    let (voxel, cell) = (largest.voxels[0].clone(), largest.cells[0].clone());
+    model.largest = Some(((session.id, 2, true), Arc::new(largest)));
+    model.cursor = 2;
+    let mut harness = harness(why::State::default(), model);
+    assert!(has(&harness, "Largest changes of step 2"));
+    let first = |harness: &Harness<'_, Stage>, of: &str| {
+        let rows = harness.query_all_by_label_contains(&format!("Change of {of}"));
+        let top = rows.min_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).expect("rows");
+        (top.accesskit_node().label().expect("named"), top.rect().center())
+    };
+    let (largest, at) = first(&harness, "voxel");
+    let [from, to] = voxel.from_to.map(words::probability);
+    assert!(largest.ends_with(&format!("{from} → {to}")), "{largest}");
+    click_at(&mut harness, at);
+    let picked = |command: &Command| match command {
+        Command::Pick(picked) => *picked,
+        _ => None,
+    };
+    assert_eq!(asked(&harness, picked), Some(voxel.of));
+    for _ in 0..2 {
+        harness.get_by_label("Sort by Change").click();
+        harness.run_steps(3);
+    }
+    assert_ne!(first(&harness, "voxel").0, largest, "the smallest first");
+    harness.get_by_label("floor cells").click();
+    harness.run_steps(3);
+    let (_, at) = first(&harness, "floor cell");
+    click_at(&mut harness, at);
+    assert_eq!(asked(&harness, picked), Some(cell.of));
+}
+
+#[test]
+fn causes_are_not_made_up_before_a_log_is_checked() {
+    let mut model = fixture::model();
+    let moments = &mut model.sessions[0].moments;
+    let voxel = moments[1].outcome.as_ref().and_then(|outcome| outcome.observation.as_ref()).expect("a look");
+    let voxel = voxel.occupied.iter().next().expect("something was seen");
+    for moment in moments.iter_mut() {
+        let outcome = moment.outcome.as_deref().cloned();
+        let outcome =
+            outcome.map(|outcome| Arc::new(nudge_core::episode::StepOutcome { observation: None, ..outcome }));
+        *moment = Arc::new(Moment { is_whole: false, outcome, ..(**moment).clone() });
+    }
+    model.picked = Some(Picked::Voxel(voxel));
+    let harness = harness(why::State::default(), model);
+    assert!(has(&harness, "not known until its log is checked") && !has(&harness, "not seen"));
+}
+
+#[test]
+fn a_run_that_pauses_says_so() {
+    let mut model = fixture::model();
+    model.sessions[0].activity = Activity::Running;
+    model.sessions[0].pausing = true;
+    let harness = harness(episode::show, model);
+    assert!(has(&harness, "pauses after this action"));
+    assert!(harness.get_by_label("Pause").accesskit_node().is_disabled());
+}
+
+#[test]
+fn the_last_decision_can_be_seen_again_before_the_next_is_made() {
+    let mut model = fixture::model();
+    model.sessions[0].pending = None;
+    let mut harness = harness(decision::State::default(), model);
+    harness.get_by_label("See the last decision").click();
+    harness.run_steps(2);
+    assert!(asked(&harness, |command| matches!(command, Command::GoTo(4)).then_some(())).is_some());
+}
+
+#[test]
 fn why_names_the_label_that_a_cell_was_given() {
     let mut model = fixture::model();
     let outcome = model.sessions[0].moments[1].outcome.clone().expect("step 1");

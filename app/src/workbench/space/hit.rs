@@ -4,21 +4,12 @@
 //! outline that lies in front, and does not come when the same instance is clicked again.
 
 use super::Drawn;
-use crate::workbench::model::Picked;
+use crate::workbench::picked::Picked;
+use crate::workbench::ray::Ray;
 use nudge_core::grid::{Grid, VoxelSet};
-use nudge_core::{Point, Vector};
 
 /// How far a ray is followed, metres: beyond any shelf.
 const FAR_M: f32 = 100.0;
-
-/// A ray from the eye of a view.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ray {
-    /// Where the eye is.
-    pub origin: Point,
-    /// Where it goes; of length 1.
-    pub direction: Vector,
-}
 
 /// The first voxel of an entity that the ray meets, or else the floor cell that it meets.
 pub fn first(grid: &Grid, drawn: &Drawn, entity: &str, ray: Ray) -> Option<Picked> {
@@ -39,6 +30,7 @@ fn floor(grid: &Grid, ray: Ray) -> Option<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nudge_core::{Point, Vector};
 
     #[test]
     fn a_ray_meets_the_nearest_drawn_voxel_and_else_the_floor() {
@@ -56,7 +48,8 @@ mod tests {
         assert_eq!(first(&grid, &drawn, "other", level), None, "level, it never meets the floor");
         // From above.
         let cell = grid.cell_at(grid.center(grid.voxel(near))).expect("a cell");
-        let down = Ray { origin: grid.cell_center(cell) + Vector::new(0.0, 0.0, 1.0), direction: Vector::new(0.0, 0.0, -1.0) };
+        let down =
+            Ray { origin: grid.cell_center(cell) + Vector::new(0.0, 0.0, 1.0), direction: Vector::new(0.0, 0.0, -1.0) };
         drawn.set("belief", Vec::new());
         assert_eq!(first(&grid, &drawn, "belief", down), Some(Picked::Cell(grid.cell_index(cell))));
         let up = Ray { direction: -down.direction, ..down };

@@ -1,7 +1,7 @@
 //! From the pointer into the room: which ray a click on a three-dimensional view follows.
 
 use super::linked;
-use crate::workbench::space::hit::Ray;
+use crate::workbench::ray::Ray;
 use nudge_core::{Point, Vector};
 use re_viewer::external::egui::{Context, Pos2, Rect};
 

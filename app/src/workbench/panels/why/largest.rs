@@ -26,7 +26,8 @@ impl Default for State {
 /// Draws the list.
 pub fn show(state: &mut State, ui: &mut Ui, model: &Model, session: &Session, ask: &mut Vec<Command>) {
     let step = model.cursor.min(session.steps());
-    let hint = format!("What the step changed by more than {CHANGED}, the {LISTED} largest first; click one to ask about it");
+    let hint =
+        format!("What the step changed by more than {CHANGED}, the {LISTED} largest first; click one to ask about it");
     heading(ui, format!("Largest changes of step {step}"), &hint);
     if step == 0 {
         ui.weak("No action led here: go to a later step");

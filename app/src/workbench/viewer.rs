@@ -171,7 +171,16 @@ impl Viewer {
     pub fn open_recording(&mut self, path: &Path) {
         self.is_foreign.store(true, Ordering::Relaxed);
         self.asked = Some(Instant::now());
+        self.drop_foreign();
         self.app.open_url_or_file(&path.to_string_lossy());
+    }
+
+    /// Frees the memory of the recording that is shown, unless it is the window's own.
+    fn drop_foreign(&mut self) {
+        let shown = self.app.active_recording_id().map(|id| id.application_id().clone());
+        if let Some(foreign) = shown.filter(|app| app.as_str() != APPLICATION) {
+            self.app.command_sender.send_system(SystemCommand::CloseApp(foreign));
+        }
     }
 
     /// Whether a recording was asked for that is not there yet. One that does not come is not waited for.
@@ -187,10 +196,11 @@ impl Viewer {
         }
     }
 
-    /// Goes back to the window's own recording.
+    /// Goes back to the window's own recording, and lets the other one go.
     pub fn close_recording(&mut self) {
         self.is_foreign.store(false, Ordering::Relaxed);
         self.asked = None;
+        self.drop_foreign();
         let own = re_log_types::ApplicationId::from(APPLICATION);
         self.app.command_sender.send_system(SystemCommand::ActivateApp(own));
     }

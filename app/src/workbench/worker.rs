@@ -6,23 +6,20 @@
 mod reopen;
 pub mod told;
 
-use super::half_belief::HalfBelief;
 use super::latest::words_of;
-use super::packed_frame::PackedFrame;
-use super::session::{Activity, Moment, SessionId, Setup};
+use super::session::{Activity, Moment, SessionId};
 use super::threads::Threads;
 use crate::driver::Driver;
-use nudge_core::belief::BeliefUpdate;
-use nudge_core::camera::{ViewArray, hidden_objects};
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, Frames, Overwrite, StepOutcome, StepRecord};
-use nudge_core::plan::{Action, Decision};
-use nudge_core::scene::{Catalog, ObjectId, Scene};
-use nudge_core::{Error, Result};
+use nudge_core::Result;
+use nudge_core::episode::{EpisodeConfig, EpisodeRecord, Frames, Overwrite, StepRecord};
+use nudge_core::plan::Decision;
+use nudge_core::scene::{Catalog, Scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use told::{Brake, Post, Track, go_on, moment, setup};
 
 /// What a worker begins with.
 pub enum Begin {

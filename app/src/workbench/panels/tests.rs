@@ -310,7 +310,8 @@ fn the_largest_changes_of_a_step_are_sorted_and_clicked() {
     let mut harness = harness(why::State::default(), model);
     assert!(has(&harness, "Largest changes of step 2"));
     let first = |harness: &Harness<'_, Stage>, of: &str| {
-        let rows = harness.query_all_by_label_contains(&format!("Change of {of}"));
+        let name = format!("Change of {of}");
+        let rows = harness.query_all_by_label_contains(&name);
         let top = rows.min_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).expect("rows");
         (top.accesskit_node().label().expect("named"), top.rect().center())
     };

@@ -46,8 +46,28 @@ struct Carrying<'a> {
 }
 
 /// The arm's motion for a pick of an object, or why there is none.
+///
+/// A cup is round, so the hand may be turned about it: of the turns that fail, the first gives the reason.
 pub(super) fn motion(
     pick: &Pick,
+    clearance: &ArmClearance<'_>,
+    target: &Patch,
+    rng: &mut ChaCha8Rng,
+) -> Result<PhasedMotion, Rejection> {
+    let mut against = Rejection::NoWay;
+    for (number, turn_deg) in TURNS_DEG.into_iter().enumerate() {
+        match motion_turned(pick, turn_deg, clearance, target, rng) {
+            Ok(motion) => return Ok(motion),
+            Err(rejection) if number == 0 => against = rejection,
+            Err(_) => (),
+        }
+    }
+    Err(against)
+}
+
+fn motion_turned(
+    pick: &Pick,
+    turn_deg: f64,
     clearance: &ArmClearance<'_>,
     target: &Patch,
     rng: &mut ChaCha8Rng,
@@ -59,11 +79,10 @@ pub(super) fn motion(
         return Err(Rejection::NoCup);
     }
     let press = (pick.touch() + pick.ahead() * PRESS_M).map(f64::from);
-    // A cup is round: the hand may be turned about it, so that the camera is out of the way.
-    let touches = TURNS_DEG.map(|turn| turned(&level_tool(&press, pick.yaw_rad()), turn));
+    let touch = turned(&level_tool(&press, pick.yaw_rad()), turn_deg);
     let up = f64::from(LIFT_M);
     let approach = Approach {
-        poses: &touches,
+        poses: &[touch],
         travel: Vector3::new(0.0, 0.0, up),
         lift_m: ALONG_AXIS_M,
         touches: Some(target),

@@ -94,6 +94,16 @@ pub struct ManipulationOutcome {
     pub passed: Vec<Joints>,
 }
 
+impl ManipulationOutcome {
+    /// Sum of the displacements, metres, without that of an object that was held until it was where it was to be.
+    pub fn disturbed_m(&self) -> f64 {
+        let is_done = |grip: &&Grip| matches!(grip.end, GripEnd::SetDown | GripEnd::Stowed);
+        let carried = self.grip.as_ref().filter(is_done).and_then(|grip| grip.object);
+        let others = (0u16..).zip(&self.displacement_m).filter(|(at, _)| carried != Some(ObjectId(*at)));
+        others.map(|(_, m)| f64::from(*m)).sum()
+    }
+}
+
 impl World {
     /// The world of the given bodies, not yet settled.
     pub fn new(shelf: Shelf, bodies: Vec<Body>) -> Self {

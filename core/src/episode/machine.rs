@@ -257,7 +257,7 @@ impl Episode {
         self.filed_truth = None;
         let happened = Happened {
             dropped: outcome.dropped.clone(),
-            displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
+            displacement_m: outcome.disturbed_m(),
             motion_s: to_wait.duration_s() + f64::from(outcome.arm_s),
             push: Some(PushReport::of(&outcome, |id| self.name(id))),
         };
@@ -327,7 +327,8 @@ impl Episode {
         updating: Instant,
         mut seconds: StepSeconds,
     ) -> StepRecord {
-        self.history.record(&decision, !happened.dropped.is_empty());
+        let grip = happened.push.as_ref().and_then(|push| push.grip.as_ref()).map(|grip| grip.end);
+        self.history.record(&decision, !happened.dropped.is_empty(), grip);
         let judge = |truth: &TruthMap| {
             let dropped = happened.dropped.iter().map(|id| self.name(*id)).collect();
             Judgement::of(&self.estimate.belief, truth, &self.catalog, dropped, happened.displacement_m)
@@ -452,7 +453,14 @@ impl Episode {
         let actions = self.history.actions.len();
         let (seen, sampler) = (config.planner.counted.left_out(self.seen()), config.planner.push_sampler);
         let planner = config.policy.settings(&config.planner);
-        let ground = Ground { belief: self.belief(), seen, arm: &self.arm, sampler, place: planner.place };
+        let ground = Ground {
+            belief: self.belief(),
+            seen,
+            arm: &self.arm,
+            sampler,
+            place: planner.place,
+            unsealed: &self.history.unsealed,
+        };
         plan::draw_candidates(&planner, &ground, config.seed, actions)
     }
 

@@ -5,13 +5,15 @@ use super::{Pick, PickPlace};
 use crate::Point;
 use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch};
 use crate::grid::{Cell, Voxel, VoxelSet};
-use crate::skill::{AVOIDED, LIKELY, Rejection};
+use crate::skill::{AVOIDED, Ground, LIKELY, Rejection};
 use crate::world::STROKE_M;
 
 /// Heights of the cup's middle above the board, metres.
 const HEIGHTS_M: [f32; 2] = [0.03, 0.12];
 /// Heights that are tried, from the middle of the object on, metres.
 const TRIED_M: [f32; 5] = [0.0, 0.02, -0.02, 0.04, -0.04];
+/// How far from where it did not seal a cup is tried again, in radii.
+const TRIED_APART: f32 = 0.75;
 /// Largest tangent of the angle between a front and the entrance's plane: 30 degrees.
 const STEEPEST: f32 = 0.577;
 /// Occupancy probability above which nothing is set down in a voxel.
@@ -35,12 +37,15 @@ pub(super) struct Offer {
 pub(super) struct Shelf<'a> {
     belief: &'a Belief,
     seen: Option<&'a VoxelSet>,
+    /// Where a cup touched and did not seal.
+    unsealed: &'a [[f32; 3]],
     plan: FloorPlan,
 }
 
 impl<'a> Shelf<'a> {
-    pub(super) fn new(belief: &'a Belief, seen: Option<&'a VoxelSet>) -> Self {
-        Self { belief, seen, plan: FloorPlan::new(belief, AVOIDED) }
+    pub(super) fn new(ground: &Ground<'a>) -> Self {
+        let Ground { belief, seen, unsealed, .. } = *ground;
+        Self { belief, seen, unsealed, plan: FloorPlan::new(belief, AVOIDED) }
     }
 
     /// The objects that stand first behind the entrance somewhere, from left to right.
@@ -107,12 +112,14 @@ impl<'a> Shelf<'a> {
         let off = |(i, row): &(f32, f32)| row - mean - slope * i;
         let (least, most) = rows.iter().map(off).fold((f32::MAX, f32::MIN), |(a, b), off| (a.min(off), b.max(off)));
         let is_flat = (most - least) * grid.voxel_m <= STROKE_M + 0.5 * grid.voxel_m;
-        (is_flat && slope.abs() <= STEEPEST).then(|| {
+        let found = (is_flat && slope.abs() <= STEEPEST).then(|| {
             let at = grid.cell_center(Cell { x: x as u16, y: 0 });
             let y = grid.origin[1] + mean * grid.voxel_m;
             let contact = Voxel { x: x as u16, y: mean.round() as u16, z: level as u16 };
             (contact, Point::new(at.x, y, grid.origin[2] + z_m), slope)
-        })
+        });
+        let is_new = |touch: &Point| self.unsealed.iter().all(|at| (Point::from(*at) - touch).norm() > TRIED_APART * radius_m);
+        found.filter(|(_, touch, _)| is_new(touch))
     }
 
     /// What is asked of voxels, for `work`.

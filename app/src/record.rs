@@ -38,9 +38,9 @@ use nudge_core::plan::{self, Action, PlannerSettings};
 use nudge_core::scene::{Body, Catalog, ObjectId, Shelf};
 use nudge_core::score::Scores;
 use nudge_core::world::TruthMap;
-use nudge_core::{Error, Result};
+use nudge_core::{Error, Pose, Result};
 use rerun::{AsComponents, EntityPath, RecordingStream, RecordingStreamBuilder};
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The application id of every recording; the viewer keeps one layout per application.
@@ -96,7 +96,7 @@ pub struct Recorder {
     /// What can be gained in the next step.
     gain: Option<plan::Gain>,
     /// Objects with a mesh in the recording that have not been cleared.
-    shown: BTreeSet<ObjectId>,
+    shown: BTreeMap<ObjectId, Pose>,
     /// The truth that was last recorded.
     truth: Option<TruthMap>,
     /// What the robot's clock shows, seconds.
@@ -120,7 +120,7 @@ impl Recorder {
         let mut recorder = Self::bare(stream, "", path, fault);
         let counted = episode.record().config.planner.counted;
         recorder.gain = Some(plan::Gain::new(counted, episode.belief(), episode.seen()));
-        recorder.shown = episode.bodies().iter().map(|body| body.id).collect();
+        recorder.shown = episode.bodies().iter().map(|body| (body.id, body.world_from_body)).collect();
         recorder.truth = episode.truth().cloned();
         recorder.robot_s = episode.record().steps.iter().map(|step| step.motion_s).sum();
         recorder.flush()?;
@@ -154,7 +154,7 @@ impl Recorder {
             file: file.to_owned(),
             fault,
             gain: None,
-            shown: BTreeSet::new(),
+            shown: BTreeMap::new(),
             truth: None,
             robot_s: 0.0,
         }
@@ -278,9 +278,16 @@ impl Recorder {
             return self.log(paths::ROBOT_PATH, &rerun::Clear::flat());
         };
         self.log(paths::ROBOT_PATH, &robot::path(arm, motion))?;
+        let held = robot::Held::in_step(arm, outcome).and_then(|held| Some((*self.shown.get(&held.object)?, held)));
         for (at_s, joints) in robot::frames(motion) {
             self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + at_s);
             pose(&joints)?;
+            // What is in hand goes with it.
+            if let Some((before, held)) = &held
+                && let Some(pose) = held.pose_at(at_s, before)
+            {
+                self.log(&paths::object(held.object), &shapes::transform(&pose))?;
+            }
         }
         // The last row of a step is the one that its timeline shows.
         let pushes = matches!(outcome.record.action, Action::Manipulate(_));
@@ -327,13 +334,13 @@ impl Recorder {
     }
 
     fn bodies(&mut self, setting: &Setting<'_>, bodies: &[Body]) -> Result<()> {
-        let present: BTreeSet<ObjectId> = bodies.iter().map(|body| body.id).collect();
-        for gone in self.shown.difference(&present) {
+        let present: BTreeMap<ObjectId, Pose> = bodies.iter().map(|body| (body.id, body.world_from_body)).collect();
+        for gone in self.shown.keys().filter(|id| !present.contains_key(id)) {
             self.log(&paths::object(*gone), &rerun::Clear::recursive())?;
         }
         for body in bodies {
             let path = paths::object(body.id);
-            if !self.shown.contains(&body.id) {
+            if !self.shown.contains_key(&body.id) {
                 self.log(&path, &shapes::glass(body, setting.catalog))?;
             }
             self.log(&path, &shapes::transform(&body.world_from_body))?;

@@ -132,6 +132,11 @@ impl CandidateRecord {
         Self { manipulation, rejection: None, gain: None, view: None, reg: None, motion_s: None, then: None }
     }
 
+    /// What it makes way for, in words, where that is what it is worth.
+    pub fn makes_way_for(&self) -> Option<String> {
+        self.then.map(|then| format!("a {} {}", then.kind().name(), then.skill().describe().short))
+    }
+
     /// What stood against it, in words; `None` for a feasible candidate.
     pub fn against(&self) -> Option<String> {
         self.rejection.as_ref().map(|rejection| self.manipulation.against(rejection))

@@ -3,8 +3,11 @@
 use super::shapes::{self, REJECTED_RGB};
 use crate::colors::Rgb;
 use nudge_core::arm::{ArmTool, Joints, Motion, Part, Role, pose_of};
+use nudge_core::Pose;
 use nudge_core::camera::{ViewArray, ViewId};
+use nudge_core::episode::StepOutcome;
 use nudge_core::plan::Decision;
+use nudge_core::scene::ObjectId;
 
 pub(crate) const LINK_RGB: Rgb = [150, 164, 180];
 pub(crate) const TOOL_RGB: Rgb = [72, 74, 80];
@@ -44,6 +47,36 @@ pub fn shown_at_s(arm: &ArmTool, motion: &Motion, decision: &Decision, pushes: b
         _ => 0.0,
     };
     motion.duration_s() - back
+}
+
+/// What the cup holds in a step's motion.
+pub struct Held<'a> {
+    /// The object.
+    pub object: ObjectId,
+    arm: &'a ArmTool,
+    motion: &'a Motion,
+    /// From when to when, seconds since the motion began.
+    span_s: [f64; 2],
+}
+
+impl<'a> Held<'a> {
+    /// Of a step whose object was held until it was where it was to be.
+    pub fn in_step(arm: &'a ArmTool, outcome: &'a StepOutcome) -> Option<Self> {
+        let grip = outcome.record.push.as_ref()?.grip.as_ref().filter(|grip| grip.end.is_held())?;
+        let number = grip.object.as_ref()?.rsplit('#').next()?.parse().ok()?;
+        let (motion, planned) = (outcome.motion.as_ref()?, outcome.record.decision.motion.as_ref()?);
+        // First the arm goes to where it waits.
+        let before_s = (motion.duration_s() - planned.duration_s(&arm.arm)).max(0.0);
+        let span_s = planned.carry_s()?.map(|s| before_s + s);
+        Some(Self { object: ObjectId(number), arm, motion, span_s })
+    }
+
+    /// Where it is at a time of the motion, when it stood at `before`: it moves with the hand, and stays where it is set down.
+    pub fn pose_at(&self, at_s: f64, before: &Pose) -> Option<Pose> {
+        let [from_s, to_s] = self.span_s;
+        let hand = |at_s: f64| Some(pose_of(&self.arm.arm.world_from_tool(&self.motion.at(at_s)?)));
+        Some(hand(at_s.clamp(from_s, to_s))? * hand(from_s)?.inverse() * before)
+    }
 }
 
 /// The path of the tip.

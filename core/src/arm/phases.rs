@@ -153,6 +153,19 @@ impl PhasedMotion {
         outward.then(&self.way_back(arm))
     }
 
+    /// From when to when something is in hand, seconds since the motion began; `None` where nothing is carried.
+    pub fn carry_s(&self) -> Option<[f64; 2]> {
+        let (mut at_s, mut carry_s) = (0.0, None);
+        for phase in self.outward() {
+            let end_s = at_s + phase.motion.duration_s();
+            if phase.kind == PhaseKind::Carry {
+                carry_s = Some([carry_s.map_or(at_s, |[from_s, _]: [f64; 2]| from_s), end_s]);
+            }
+            at_s = end_s;
+        }
+        carry_s
+    }
+
     /// Whether `arm` can carry it out from `ready`, with its tip at `from` and `to` at both ends of the contact, to within a
     /// tenth of a millimetre.
     pub fn leads(&self, arm: &Arm, ready: &Joints, from: Point, to: Point) -> bool {

@@ -58,7 +58,8 @@ fn made_feasible(
     let ground = Ground { belief: &after, ..situation.ground(settings) };
     let mut rng = stream(situation.seed, "picks ahead", situation.history.actions.len() as u64);
     let is_new = |candidate: &Candidate| {
-        let apart = |a: &Pick, b: &Pick| (0..3).map(|i| (a.contact[i] - b.contact[i]).powi(2)).sum::<f32>().sqrt() > APART_M;
+        let apart =
+            |a: &Pick, b: &Pick| (0..3).map(|i| (a.contact[i] - b.contact[i]).powi(2)).sum::<f32>().sqrt() > APART_M;
         candidate.rejection.is_none()
             && pick_of(&candidate.manipulation).is_some_and(|pick| now.iter().all(|other| apart(&pick, other)))
     };

@@ -5,7 +5,7 @@
 
 mod suction;
 
-pub use suction::{BEND_NM, PULL_N, STROKE_M};
+pub use suction::{BEND_NM, LIP_M, PULL_N, STROKE_M};
 
 use super::hull::Hull;
 use super::shelf_panels;

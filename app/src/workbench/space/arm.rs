@@ -1,10 +1,13 @@
 //! The arm before the shelf: where it is in a step's motion, and the way of its tip.
 
 use super::{Painter, Side, Space, at, nothing, shapes};
+use crate::colors;
 use crate::record::robot;
 use nudge_core::Pose;
 use nudge_core::arm::{ArmTool, Joints, Motion, Role, pose_of};
+use nudge_core::episode::StepOutcome;
 use nudge_core::plan::Action;
+use nudge_core::scene::Body;
 use nudge_core::solid::ConvexPart;
 
 impl Painter {
@@ -17,16 +20,23 @@ impl Painter {
         if !self.differs(at::ARM, format!("{:?} {shown} {:?}", side.key(), space.motion_s)) {
             return;
         }
-        let joints = match (outcome, motion) {
-            (Some(outcome), Some(motion)) => {
-                let pushes = matches!(outcome.record.action, Action::Manipulate(_));
-                let rests_s = || robot::shown_at_s(arm, motion, &outcome.record.decision, pushes);
-                motion.at(space.motion_s.unwrap_or_else(rests_s))
-            }
-            _ => arm.ready,
-        };
+        let (mut joints, mut held) = (arm.ready, None);
+        if let (Some(outcome), Some(motion)) = (outcome, motion) {
+            let pushes = matches!(outcome.record.action, Action::Manipulate(_));
+            let rests_s = || robot::shown_at_s(arm, motion, &outcome.record.decision, pushes);
+            let at_s = space.motion_s.unwrap_or_else(rests_s);
+            joints = motion.at(at_s);
+            held = in_hand(side, outcome, at_s);
+        }
         match joints.filter(|_| shown) {
-            Some(joints) => self.log(at::ARM, &links(arm, &joints)),
+            Some(joints) => {
+                let mut facets = links(arm, &joints);
+                if let Some((body, pose)) = held {
+                    let [r, g, b] = colors::of_class(&side.setup.catalog, body.class);
+                    facets.add(&body.solid.parts, &pose, rerun::Rgba32::from_unmultiplied_rgba(r, g, b, 255));
+                }
+                self.log(at::ARM, &facets.mesh(255));
+            }
             None => self.log(at::ARM, &nothing()),
         }
         match motion.filter(|_| shown) {
@@ -36,8 +46,15 @@ impl Painter {
     }
 }
 
-/// All links of the arm as one mesh in the shelf's frame.
-fn links(arm: &ArmTool, joints: &Joints) -> rerun::Mesh3D {
+/// What a step's motion carries, with where it is at a time of the motion.
+fn in_hand<'a>(side: &'a Side, outcome: &StepOutcome, at_s: f64) -> Option<(&'a Body, Pose)> {
+    let held = robot::Held::in_step(&side.setup.arm, outcome)?;
+    let body = side.before.as_ref()?.bodies.iter().find(|body| body.id == held.object)?;
+    Some((body, held.pose_at(at_s, &body.world_from_body)?))
+}
+
+/// All links of the arm in the shelf's frame.
+fn links(arm: &ArmTool, joints: &Joints) -> Facets {
     let poses = arm.arm.body_poses(joints);
     let mut facets = Facets::default();
     for (body, part) in arm.arm.parts() {
@@ -45,7 +62,7 @@ fn links(arm: &ArmTool, joints: &Joints) -> rerun::Mesh3D {
         let color = rerun::Rgba32::from_unmultiplied_rgba(r, g, b, 255);
         facets.add(std::slice::from_ref(&part.shape), &pose_of(&poses[body]), color);
     }
-    facets.mesh(255)
+    facets
 }
 
 /// Coloured triangles of solids, on their way to one mesh.

@@ -13,9 +13,9 @@ fn behind_two() -> Belief {
     let boxes = [([-0.035, 0.035, 0.05, 0.10], 0.10, 3), ([-0.15, 0.15, 0.15, 0.20], 0.30, 5)];
     for index in 0..grid.voxel_count() {
         let at = grid.center(grid.voxel(index));
-        let filled = boxes.iter().any(|([x0, x1, y0, y1], top, _)| {
-            (*x0..*x1).contains(&at.x) && (*y0..*y1).contains(&at.y) && at.z < *top
-        });
+        let filled = boxes
+            .iter()
+            .any(|([x0, x1, y0, y1], top, _)| (*x0..*x1).contains(&at.x) && (*y0..*y1).contains(&at.y) && at.z < *top);
         belief.occupancy[index] = if filled {
             evidence(3.4, 40.0)
         } else if (-0.07..0.07).contains(&at.x) && at.y >= 0.20 && at.z < 0.20 {

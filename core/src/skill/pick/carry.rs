@@ -9,13 +9,15 @@ use crate::belief::Patch;
 use crate::rng::ChaCha8Rng;
 use crate::skill::clearance::{Approach, ArmClearance, QUERY};
 use crate::skill::{Rejection, Stage};
+use crate::world::{LIP_M, STROKE_M};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
 pub use super::room::LIFT_M;
 
-/// How far the cup is pressed on beyond where the belief has the front, metres: half of what the bellows gives way.
-pub const PRESS_M: f32 = 0.004;
+/// How far the cup is pressed on beyond the middle of the front, metres: midway between where its lip just meets it and where
+/// the bellows gives way no farther.
+pub const PRESS_M: f32 = 0.5 * (STROKE_M - LIP_M);
 /// How far above the board an object is let go, metres: what is lowered farther would be pressed on the board.
 pub const GAP_M: f32 = 0.001;
 /// How far the cup goes along its own axis at the end of its way in, metres.
@@ -160,7 +162,8 @@ impl Carrying<'_> {
         let from = self.at;
         let mut met = Rejection::Unreachable { stage: OUT };
         // First to the side where it is already: on the other one it would come past the whole shelf.
-        let side = if arm.world_from_tool(&from).translation.x < arm.world_from_base.translation.x { 1.0 } else { -1.0 };
+        let side =
+            if arm.world_from_tool(&from).translation.x < arm.world_from_base.translation.x { 1.0 } else { -1.0 };
         for quarter in [side * FRAC_PI_2, -side * FRAC_PI_2] {
             let steps = (FRAC_PI_2 / TURN_STEP_RAD).ceil() as usize;
             let turned = |step: usize| {

@@ -15,7 +15,7 @@ use rapier3d::prelude::{Group, RigidBodyHandle};
 /// How far the bellows gives way: the rim seals on what is at most so far behind it, uncompressed, metres.
 pub const STROKE_M: f32 = 0.008;
 /// How far before the rim a surface may be that the lip still meets, metres.
-const LIP_M: f32 = 0.002;
+pub const LIP_M: f32 = 0.002;
 /// Load at which what is held comes off, newtons.
 pub const PULL_N: f32 = 30.0;
 /// Moment about the cup's middle at which it comes off, newton metres.

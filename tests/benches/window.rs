@@ -8,7 +8,7 @@ use egui_kittest::Harness;
 use nudge::workbench::app::{App, Options};
 use nudge::workbench::command::Command;
 use nudge::workbench::half_belief::HalfBelief;
-use nudge::workbench::model::StartForm;
+use nudge::workbench::model::{LayoutKind, Picked, StartForm};
 use nudge::workbench::session::Moment;
 use nudge_core::belief::CLASSICAL;
 use nudge_tests::{nudge_bin, root};
@@ -35,6 +35,8 @@ fn main() {
     harness.state_mut().ask(Command::Open(root().join(SCENE)));
     step_until(&mut harness, |app| !app.is_busy());
     run(&mut harness);
+    pictures(&mut harness);
+    reopen(&mut harness);
     many_voxels(&mut harness);
     memory(&folder.path().join("real"));
 }
@@ -72,6 +74,56 @@ fn run(harness: &mut Harness<'_, App>) {
     row("the viewer's part of a frame on the processor, median", median(&mut viewer), f32::NAN, "ms");
     row("from a step's belief to maps and views that show it, median", median(&mut shown), 100.0, "ms");
     row("the same, 95 of 100 steps", share(&shown, 95), 100.0, "ms");
+}
+
+/// From a command to its picture, with what this machine's graphics driver takes: on software graphics most of it.
+fn pictures(harness: &mut Harness<'_, App>) {
+    let push = harness.state().model.session().and_then(|session| {
+        let pushed = |moment: &Arc<Moment>| moment.decision().is_some_and(|decision| !decision.candidates.is_empty());
+        session.moments.iter().find(|moment| pushed(moment)).map(|moment| moment.step - 1)
+    });
+    picture_of(harness, Command::GoTo(push.unwrap_or(10)));
+    for layout in [LayoutKind::Why, LayoutKind::Gains, LayoutKind::Push, LayoutKind::Episode] {
+        let ms = picture_of(harness, Command::Layout(layout));
+        row(&format!("from the tab of {} to its picture", layout.title()), ms, 500.0, "ms");
+    }
+    let steps: Vec<f32> = (1..=9).map(|step| picture_of(harness, Command::GoTo(4 * step))).collect();
+    row("from a step of the clock to its picture, median of 9", median(&mut steps.clone()), 300.0, "ms");
+    picture_of(harness, Command::Layout(LayoutKind::Why));
+    let voxels: Vec<f32> =
+        (1..=9).map(|at| picture_of(harness, Command::Pick(Some(Picked::Voxel(90_000 * at))))).collect();
+    row("from a voxel that is picked to its picture, median of 9", median(&mut voxels.clone()), 500.0, "ms");
+}
+
+/// Milliseconds until a picture shows what was asked for.
+fn picture_of(harness: &mut Harness<'_, App>, command: Command) -> f32 {
+    let began = Instant::now();
+    harness.state_mut().ask(command);
+    loop {
+        // What a frame asks for in the background is drawn by a later one.
+        harness.step();
+        let at_rest = !harness.state().is_busy();
+        harness.render().expect("a picture");
+        if at_rest && !harness.state().is_busy() {
+            return began.elapsed().as_secs_f32() * 1e3;
+        }
+    }
+}
+
+/// The episode is closed and opened again: until its first picture, and until its log is repeated.
+fn reopen(harness: &mut Harness<'_, App>) {
+    let (id, path) = harness.state().model.session().map(|session| (session.id, session.path.clone())).expect("open");
+    harness.state_mut().ask(Command::Close(id));
+    (0..3).for_each(|_| harness.step());
+    // Its thread ends the recording.
+    std::thread::sleep(Duration::from_secs(5));
+    let began = Instant::now();
+    harness.state_mut().ask(Command::Open(path));
+    step_until(harness, |app| app.model.session().is_some() && app.is_shown());
+    harness.render().expect("a picture");
+    row("from opening the 40-step episode to its first picture", began.elapsed().as_secs_f32() * 1e3, 1500.0, "ms");
+    step_until(harness, |app| !app.is_busy());
+    row("until its log is checked", began.elapsed().as_secs_f32() * 1e3, f32::NAN, "ms");
 }
 
 /// A state whose belief is as ragged as can be, so that as many voxels are drawn as ever are.
@@ -130,7 +182,7 @@ fn memory(out: &std::path::Path) {
         }
         std::thread::sleep(Duration::from_millis(200));
     }
-    row("memory of the program with a 40-step episode, at the peak", peak / 1024.0, 1024.0, "MB");
+    row("memory of the program with a 40-step episode, at the peak", peak / 1024.0, 700.0, "MB");
 }
 
 /// Processes of the program that were started to write this picture.

@@ -1,6 +1,8 @@
 //! The real window: the binary under a virtual display, the pictures of every layout, the exported recording in the
 //! stock viewer. They need software Vulkan (Debian's mesa-vulkan-drivers) and Xvfb, which `make test-window` installs.
 
+#[path = "window/clicks.rs"]
+mod clicks;
 #[path = "window/pictures.rs"]
 mod pictures;
 

@@ -3,18 +3,21 @@
 mod carry_out;
 mod draw;
 mod files;
+mod follow;
 mod shown;
 mod take_in;
 #[cfg(test)]
 mod tests;
 
 use super::browser::Browser;
-use super::command::{Command, Level};
+use super::changes::{self, Largest};
+use super::command::{Command, Level, MenuCommand};
 use super::derive::Derived;
 use super::dialog::Dialog;
 use super::latest::{Latest, Wake};
 use super::model::{GainSource, LayoutKind, Model, Picked, Preview, Remembered};
 use super::part::Part;
+use super::ray::Ray;
 use super::session::{Activity, SessionId};
 use super::space::{Drawn, Painter};
 use super::tasks::Tasks;
@@ -115,6 +118,7 @@ struct Background {
     other_maps: Latest<Derived>,
     preview: Latest<Preview>,
     gain: Latest<GainSource>,
+    changes: Latest<(changes::Of, Largest)>,
     space: Latest<()>,
 }
 
@@ -125,12 +129,14 @@ impl Background {
             other_maps: Latest::new("floor maps of the other episode"),
             preview: Latest::new("push preview"),
             gain: Latest::new("gain of a view"),
+            changes: Latest::new("largest changes"),
             space: Latest::new("three-dimensional views"),
         };
         background.maps.wake_with(wake.clone());
         background.other_maps.wake_with(wake.clone());
         background.preview.wake_with(wake.clone());
         background.gain.wake_with(wake.clone());
+        background.changes.wake_with(wake.clone());
         background.space.wake_with(wake.clone());
         background
     }
@@ -140,15 +146,26 @@ impl Background {
             || self.other_maps.is_busy()
             || self.preview.is_busy()
             || self.gain.is_busy()
+            || self.changes.is_busy()
             || self.space.is_busy()
     }
 
     /// Why jobs broke down since the last call.
     fn broke(&self) -> Vec<String> {
-        let (maps, views) =
-            ([&self.maps, &self.other_maps], [self.preview.broke(), self.gain.broke(), self.space.broke()]);
+        let (maps, views) = (
+            [&self.maps, &self.other_maps],
+            [self.preview.broke(), self.gain.broke(), self.changes.broke(), self.space.broke()],
+        );
         maps.into_iter().map(Latest::broke).chain(views).flatten().collect()
     }
+}
+
+/// What became of a file dialog.
+enum Chosen {
+    /// A path was chosen.
+    Path(ChosenFor, PathBuf),
+    /// The system has no such dialog.
+    NoDialog(ChosenFor, MenuCommand),
 }
 
 /// What a file dialog was opened for.
@@ -203,7 +220,7 @@ pub struct App {
     openings: BTreeMap<SessionId, Opening>,
     events: Channel<(SessionId, Event)>,
     /// Paths that were chosen in the system's dialogs.
-    chosen: Channel<(ChosenFor, PathBuf)>,
+    chosen: Channel<Chosen>,
     background: Background,
     tasks: Tasks,
     pairs: Vec<Pair>,
@@ -211,11 +228,17 @@ pub struct App {
     begun: BTreeSet<PathBuf>,
     /// The gain that was asked for last: the state and the view.
     asked_gain: Option<((SessionId, usize), ViewId)>,
+    /// The changes that were asked for last.
+    asked_changes: Option<changes::Of>,
     /// The prediction that was asked for last: the state and the push.
     asked_preview: Option<((SessionId, usize), Manipulation)>,
     /// Where the parts of the window were drawn last, points.
     parts: Vec<(Part, egui::Rect)>,
     viewer: Option<Viewer>,
+    /// The ray of a click on the three-dimensional views in this frame.
+    ray: Option<Ray>,
+    /// The voxel that a click was on, until the viewer has told whether something else was meant.
+    pointed: Option<Picked>,
     /// Why there is no viewer.
     no_viewer: Option<String>,
     /// What draws.
@@ -301,8 +324,11 @@ impl App {
             begun: BTreeSet::new(),
             asked_gain: None,
             asked_preview: None,
+            asked_changes: None,
             parts: Vec::new(),
             viewer: None,
+            ray: None,
+            pointed: None,
             no_viewer: None,
             graphics: "none".to_owned(),
             painter: None,
@@ -366,6 +392,11 @@ impl App {
     /// An open question in front of everything else.
     pub fn dialog(&self) -> Option<&Dialog> {
         self.dialog.as_ref()
+    }
+
+    /// Where a part of the window was drawn last, points.
+    pub fn place_of(&self, part: Part) -> Option<egui::Rect> {
+        self.parts.iter().find(|(of, _)| *of == part).map(|(_, rect)| *rect)
     }
 
     /// Voxels of the belief that are drawn in three dimensions.

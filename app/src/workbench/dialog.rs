@@ -17,6 +17,13 @@ pub enum Dialog {
         /// Which part of the window, for a picture.
         part: Part,
     },
+    /// Which file or directory shall be opened, where the system has no dialog for it.
+    OpenPath {
+        /// Opening a scene or an episode.
+        what: MenuCommand,
+        /// The path as it is typed.
+        path: String,
+    },
     /// An episode's worker broke down: what shall become of the episode.
     Broke {
         /// The episode.
@@ -58,6 +65,8 @@ impl Dialog {
 pub enum Reply {
     /// Write it, or that part of the window, there.
     Write(MenuCommand, PathBuf, Part),
+    /// Open it.
+    Open(PathBuf),
     /// Export the episode whose worker broke down.
     Export(SessionId),
     /// Close it and open its directory again, to go on.

@@ -143,7 +143,7 @@ fn record_into(session: &Session, record: &EpisodeRecord, path: &Path, watch: Wa
             scores: moment.scores.as_ref(),
             entropy_nats: moment.entropy_nats,
         };
-        recorder.record(&setting, &state, moment.outcome.as_deref())?;
+        recorder.record(&setting, &state, moment.whole_outcome().as_ref())?;
         let objects = moment.outcome.as_ref().map_or(&[][..], |outcome| outcome.record.objects());
         let note = session.annotations.notes.get(&moment.step).map(String::as_str);
         recorder.remark(note, &session.annotations.judge(moment.step, objects))?;

@@ -3,6 +3,7 @@
 use super::derive::Derived;
 use super::half_belief::HalfBelief;
 use super::model::{GainSource, Model, Preview};
+use super::packed_frame::PackedFrame;
 use super::session::{Activity, Moment, Session, SessionId, Setup};
 use nudge_core::belief::{BeliefUpdate, Classical};
 use nudge_core::camera::ViewId;
@@ -69,7 +70,7 @@ impl Script {
             update: Some(update),
             arm: episode.arm().clone(),
             unreachable: Arc::new(episode.unreachable_views().to_vec()),
-            hidden: Arc::new(vec!["tomato_can#1".to_owned()]),
+            hidden: Some(Arc::new(vec!["tomato_can#1".to_owned()])),
         };
         let mut truth = Arc::new(episode.truth().expect("a truth").clone());
         let mut moments = vec![moment(&episode, None, &mut truth)];
@@ -83,14 +84,15 @@ impl Script {
                 (decision.action, decision.reason) = (Action::Look { view }, Reason::Manual);
             }
             let outcome = episode.act(decision).expect("act");
-            moments.push(moment(&episode, Some(Arc::new(outcome)), &mut truth));
+            moments.push(moment(&episode, Some(outcome), &mut truth));
         }
         let pending = (!episode.is_finished()).then(|| Arc::new(episode.decide()));
         Played { record: episode.record().clone(), setup, moments, pending }
     }
 }
 
-fn moment(episode: &Episode, outcome: Option<Arc<StepOutcome>>, truth: &mut Arc<TruthMap>) -> Arc<Moment> {
+fn moment(episode: &Episode, mut outcome: Option<StepOutcome>, truth: &mut Arc<TruthMap>) -> Arc<Moment> {
+    let frame = PackedFrame::taken_from(outcome.as_mut());
     let now = episode.truth().expect("a truth");
     if **truth != *now {
         *truth = Arc::new(now.clone());
@@ -104,7 +106,9 @@ fn moment(episode: &Episode, outcome: Option<Arc<StepOutcome>>, truth: &mut Arc<
         bodies: Arc::new(episode.bodies()),
         scores: record.scores_after(record.steps.len()).copied(),
         entropy_nats: record.entropy_after(record.steps.len()),
-        outcome,
+        outcome: outcome.map(Arc::new),
+        frame,
+        is_whole: true,
     })
 }
 
@@ -119,6 +123,8 @@ impl Played {
             moments: self.moments.clone(),
             pending: self.pending.clone(),
             activity: Activity::Idle,
+            queued: false,
+            pausing: false,
             read_only: None,
             annotations: super::annotations::Annotations::default(),
             unsaved: false,

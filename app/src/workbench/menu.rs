@@ -195,8 +195,7 @@ impl M {
     /// Whether it can be done now: what is about an episode, only while one is in sight.
     pub fn is_available(self, model: &Model) -> bool {
         let session = model.session().filter(|_| model.shows_episode());
-        let idle = session.is_some_and(|session| session.activity == Activity::Idle);
-        let open = session.is_some_and(Session::is_open);
+        let orders = session.is_some_and(Session::takes_orders);
         let authoring = model.kept.layout == LayoutKind::Author;
         match self {
             M::Save => authoring || model.session().is_some_and(|session| session.unsaved),
@@ -204,14 +203,15 @@ impl M {
             M::ExportEpisode | M::ExportTables | M::CloseEpisode => session.is_some(),
             M::StepBack | M::First => session.is_some() && model.cursor > 0,
             M::StepForward | M::Last => session.is_some() && model.cursor < model.last_step(),
-            M::Decide | M::DoIt | M::Run => idle && open,
+            M::Decide | M::DoIt | M::Run => orders,
             M::RunBoth => {
-                let can_run = |session: &Session| session.activity == Activity::Idle && session.is_open();
                 let other = model.other_session().filter(|_| session.is_some());
-                other.is_some_and(|other| can_run(other) || (idle && open))
+                other.is_some_and(|other| other.takes_orders() || orders)
             }
-            M::Pause => session.is_some() && model.runs_any(|session| session.activity == Activity::Running),
-            M::Cancel => session.is_some() && model.runs_any(|session| session.activity != Activity::Idle),
+            M::Pause => {
+                session.is_some() && model.runs_any(|session| session.activity == Activity::Running && !session.pausing)
+            }
+            M::Cancel => session.is_some() && model.runs_any(Session::can_be_cancelled),
             M::Branch => session.is_some(),
             M::EditScene => model.session().is_some(),
             _ => true,

@@ -3,8 +3,10 @@
 
 use super::author::Author;
 use super::browser::Browser;
+use super::changes::{self, Largest};
 use super::derive::Derived;
 pub use super::layout_kind::LayoutKind;
+pub use super::picked::Picked;
 use super::session::{Moment, Session, SessionId};
 use super::toasts::Toasts;
 use crate::driver::default_belief;
@@ -84,15 +86,6 @@ impl Default for Display {
             robot: false,
         }
     }
-}
-
-/// A voxel or a floor cell that a person asks about, by its position in the grid's arrays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Picked {
-    /// A voxel.
-    Voxel(usize),
-    /// A floor cell.
-    Cell(usize),
 }
 
 /// What the pointer is over, to be highlighted in three dimensions.
@@ -253,6 +246,8 @@ pub struct Model {
     pub preview: Option<Preview>,
     /// The last answered gain source.
     pub gain_source: Option<GainSource>,
+    /// The largest changes of the step that they were asked for last.
+    pub largest: Option<(changes::Of, Arc<Largest>)>,
     /// Floor maps and full-precision beliefs of the states that are shown, made in the background.
     pub derived: BTreeMap<(SessionId, usize), Arc<Derived>>,
     /// Whether the scenes to choose from are shown in place of the episode.

@@ -22,7 +22,7 @@ pub mod why;
 pub mod windows;
 
 mod arrows;
-mod causes;
+pub(super) mod causes;
 mod facts;
 mod floor;
 mod legend;

@@ -2,6 +2,7 @@
 
 use super::annotations::Annotations;
 use super::half_belief::HalfBelief;
+use super::packed_frame::PackedFrame;
 use crate::driver::default_out;
 use crate::record::decision::Series;
 use nudge_core::arm::ArmTool;
@@ -66,14 +67,25 @@ pub struct Moment {
     pub scores: Option<Scores>,
     /// Entropy of what is believed, nats.
     pub entropy_nats: f64,
-    /// What the step brought; `None` for the prior.
+    /// What the step brought, but for the camera's image; `None` for the prior.
     pub outcome: Option<Arc<StepOutcome>>,
+    /// What the camera saw in the step, if it was a look.
+    pub frame: Option<PackedFrame>,
+    /// Whether all of it is there. Of an episode that was opened a moment ago there is only what its files hold: no
+    /// observations, motions and predictions, nothing of what was seen, and no bodies after the first push.
+    pub is_whole: bool,
 }
 
 impl Moment {
     /// What was weighed before the step; `None` for the prior.
     pub fn decision(&self) -> Option<&Decision> {
         self.outcome.as_ref().map(|outcome| &outcome.record.decision)
+    }
+
+    /// All that the step brought, with the camera's image.
+    pub fn whole_outcome(&self) -> Option<StepOutcome> {
+        let frame = self.frame.as_ref().and_then(PackedFrame::frame);
+        Some(StepOutcome { frame, ..(**self.outcome.as_ref()?).clone() })
     }
 
     /// A score of the state; without a truth there is the entropy alone.
@@ -88,8 +100,15 @@ pub enum Activity {
     /// Waits for an order.
     #[default]
     Idle,
-    /// Repeats the log of an episode that is being opened or branched: steps done, steps in all.
+    /// Begins an episode, or repeats the steps that a branch shares: steps done, steps in all.
     Opening {
+        /// Steps repeated so far.
+        done: usize,
+        /// Steps in the log.
+        of: usize,
+    },
+    /// Repeats the log of an episode that is shown already, and compares it with the files.
+    Checking {
         /// Steps repeated so far.
         done: usize,
         /// Steps in the log.
@@ -116,8 +135,8 @@ pub struct Setup {
     pub arm: Arc<ArmTool>,
     /// Views that its hand cannot be at.
     pub unreachable: Arc<Vec<ViewId>>,
-    /// Objects that no view saw at the start, by name.
-    pub hidden: Arc<Vec<String>>,
+    /// Objects that no view saw at the start, by name; `None` until they are counted.
+    pub hidden: Option<Arc<Vec<String>>>,
 }
 
 /// An open episode. Cheap to clone: its states are shared.
@@ -137,8 +156,12 @@ pub struct Session {
     pub pending: Option<Arc<Decision>>,
     /// What the worker is at.
     pub activity: Activity,
+    /// Whether it has been told to decide or to run as soon as its log is checked.
+    pub queued: bool,
     /// Why nothing more can be done with it, if it can only be looked at.
     pub read_only: Option<String>,
+    /// Whether its run ends after the action that it is at.
+    pub pausing: bool,
     /// Notes and verdicts of a person.
     pub annotations: Annotations,
     /// Whether something has changed since it was last saved.
@@ -170,6 +193,21 @@ impl Session {
     /// Whether something more can be done in it.
     pub fn is_open(&self) -> bool {
         self.read_only.is_none() && !self.is_finished()
+    }
+
+    /// Whether it is at something that a person asked for.
+    pub fn can_be_cancelled(&self) -> bool {
+        match self.activity {
+            Activity::Idle => false,
+            Activity::Checking { .. } => self.queued,
+            _ => true,
+        }
+    }
+
+    /// Whether it can be told to decide or to run: idle, or to do so once its log is checked.
+    pub fn takes_orders(&self) -> bool {
+        let waits = matches!(self.activity, Activity::Checking { .. }) && !self.queued;
+        self.is_open() && (self.activity == Activity::Idle || waits)
     }
 
     /// The state after `step` actions, or the last one there is.

@@ -6,6 +6,8 @@
 
 mod arm;
 pub mod at;
+mod faces;
+pub mod hit;
 mod layout;
 mod outlines;
 mod push;
@@ -19,6 +21,7 @@ use crate::colors::{Colormap, Rgb};
 use crate::record::layout::Ground;
 use crate::record::shapes;
 use crate::record::voxels::colored;
+use faces::Faces;
 use nudge_core::Point;
 use nudge_core::belief::Belief;
 use nudge_core::camera::ViewId;
@@ -29,10 +32,13 @@ use outlines::outlines;
 use rerun::{AsComponents, RecordingStream};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
-use voxels::{Voxels, voxel_key};
+use voxels::{Shown, Voxels, voxel_key};
 
 /// Drawn instances of one entity at most, so that the window stays quick.
 const MOST_VOXELS: usize = 200_000;
+
+/// Corners of a mesh at most, 28 bytes each; what has more is drawn as boxes.
+const MOST_CORNERS: usize = 600_000;
 
 /// One episode's state.
 #[derive(Clone)]
@@ -126,6 +132,11 @@ impl Drawn {
         drawn.get(entity)?.get(instance).copied()
     }
 
+    /// The voxels that are drawn of an entity.
+    pub fn voxels(&self, entity: &str) -> Arc<Vec<usize>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).get(entity).cloned().unwrap_or_default()
+    }
+
     /// Number of voxels drawn.
     pub fn count(&self, entity: &str) -> usize {
         let drawn = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -210,10 +221,15 @@ impl Painter {
         }
     }
 
-    fn log_voxels(&self, entity: &'static str, grid: &Grid, voxels: Vec<usize>, rgb: impl Fn(usize) -> Rgb) {
-        let voxels = thinned(voxels);
-        self.log(entity, &colored(grid, &voxels, rgb));
-        self.drawn.set(entity, voxels);
+    fn log_voxels(&self, entity: &'static str, grid: &Grid, shown: Shown<'_>) {
+        let outside = thinned(shown.outside);
+        let faces = Faces::of(grid, &outside, &shown.inside, &shown.rgb);
+        // A mesh has few corners where voxels of one colour lie side by side; where they do not, boxes take less room.
+        let (mesh, boxes) =
+            if faces.corners() <= MOST_CORNERS { (faces.mesh(), &[][..]) } else { (None, &outside[..]) };
+        self.log(entity, &mesh.unwrap_or_else(nothing));
+        self.log(entity, &colored(grid, boxes, shown.rgb));
+        self.drawn.set(entity, outside);
     }
 
     fn clear_all(&mut self) {
@@ -222,7 +238,7 @@ impl Painter {
         }
         let grid = Grid::for_shelf([0.1; 3], 0.1);
         for entity in [at::BELIEF, at::PREDICTED, at::DIFFERENCE, at::HAPPENED, at::GAIN, at::OTHER, at::BETWEEN] {
-            self.log_voxels(entity, &grid, Vec::new(), |_| [0; 3]);
+            self.log_voxels(entity, &grid, Shown::nothing());
         }
         for entity in [
             at::ARM_PATH,
@@ -283,10 +299,9 @@ impl Painter {
             (Some(before), ColourBy::Change) => Some(self.full((side.id, before.step), &before.belief)),
             _ => None,
         };
-        let (voxels, rgb) =
-            Voxels { belief: &belief, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
-                .drawn(&space.display, before.as_deref());
-        self.log_voxels(at::BELIEF, &belief.grid, voxels, rgb);
+        let shown = Voxels { belief: &belief, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
+            .drawn(&space.display, before.as_deref());
+        self.log_voxels(at::BELIEF, &belief.grid, shown);
     }
 
     fn cameras(&mut self, side: &Side, space: &Space) {
@@ -330,7 +345,7 @@ impl Painter {
                 let drawn = crate::record::voxels::telling(&source.nats, source.top);
                 self.drawn.set(at::GAIN, drawn.into_iter().map(|(index, _)| index).collect());
             }
-            None => self.log_voxels(at::GAIN, grid, Vec::new(), |_| [0; 3]),
+            None => self.log_voxels(at::GAIN, grid, Shown::nothing()),
         }
     }
 
@@ -339,10 +354,9 @@ impl Painter {
         let key = format!("{:?} {:?}", other.key(), voxel_key(&space.display));
         let b = self.full(other.key(), &other.moment.belief);
         if self.differs(at::OTHER, key.clone()) {
-            let (voxels, rgb) =
-                Voxels { belief: &b, truth: other.moment.truth.as_deref(), catalog: &other.setup.catalog }
-                    .drawn(&space.display, None);
-            self.log_voxels(at::OTHER, &b.grid, voxels, rgb);
+            let shown = Voxels { belief: &b, truth: other.moment.truth.as_deref(), catalog: &other.setup.catalog }
+                .drawn(&space.display, None);
+            self.log_voxels(at::OTHER, &b.grid, shown);
         }
         let shown = space.display.truth.then_some(&other.moment.bodies);
         let outlined = format!("{:?} {}", shown.map(|bodies| (other.id, Arc::as_ptr(bodies))), space.light);
@@ -352,13 +366,12 @@ impl Painter {
         if self.differs(at::BETWEEN, format!("{:?} {key}", side.key())) {
             let a = self.full(side.key(), &side.moment.belief);
             if a.grid != b.grid {
-                return self.log_voxels(at::BETWEEN, &a.grid, Vec::new(), |_| [0; 3]);
+                return self.log_voxels(at::BETWEEN, &a.grid, Shown::nothing());
             }
             let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..space.display.clone() };
-            let (voxels, rgb) =
-                Voxels { belief: &a, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
-                    .drawn(&changed, Some(&b));
-            self.log_voxels(at::BETWEEN, &a.grid, voxels, rgb);
+            let shown = Voxels { belief: &a, truth: side.moment.truth.as_deref(), catalog: &side.setup.catalog }
+                .drawn(&changed, Some(&b));
+            self.log_voxels(at::BETWEEN, &a.grid, shown);
         }
     }
 
@@ -378,9 +391,11 @@ impl Painter {
             };
             self.log(at::HOVERED, &strips);
         }
-        if self.differs(at::PICKED, format!("{:?} {:?}", side.id, space.picked)) {
+        // The mark belongs to the question; other layouts ask another.
+        let picked = space.picked.filter(|_| space.layout == LayoutKind::Why);
+        if self.differs(at::PICKED, format!("{:?} {picked:?}", side.id)) {
             let grid = side.moment.belief.grid();
-            let strips = match space.picked {
+            let strips = match picked {
                 None => rerun::LineStrips3D::new(Vec::<Vec<[f32; 3]>>::new()),
                 Some(Picked::Voxel(index)) => box_edges(grid, index..index + 1),
                 Some(Picked::Cell(cell)) => box_edges(grid, grid.column(cell)),

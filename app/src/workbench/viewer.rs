@@ -5,8 +5,11 @@
 //! clicks on comes back through [`Viewer::clicked`].
 
 mod linked;
+mod sight;
 
+use super::ray::Ray;
 use re_viewer::external::re_ui::{RecordingCommand, RecordingCommandKind, RecordingCommandSender as _};
+use re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
 use re_viewer::external::{eframe, egui, re_log_channel, re_log_types, tokio};
 use rerun::external::re_sdk_types::blueprint::components::PanelState;
 use rerun::grpc_server::GrpcServerSink;
@@ -74,8 +77,10 @@ impl Viewer {
         options.panel_state_overrides.time = Some(PanelState::Hidden);
         let heard = clicked.clone();
         options.on_event = Some(Rc::new(move |event: re_viewer::ViewerEvent| {
-            if let re_viewer::ViewerEventKind::SelectionChange { items } = event.kind {
-                *heard.borrow_mut() = items.iter().find_map(clicked_of);
+            if let re_viewer::ViewerEventKind::SelectionChange { items } = event.kind
+                && let Some(clicked) = items.iter().find_map(clicked_of)
+            {
+                *heard.borrow_mut() = Some(clicked);
             }
         }));
         // The viewer takes the space bar, arrows, Home and End as soon as a frame begins. Around its hook, so in the order
@@ -147,16 +152,35 @@ impl Viewer {
         ui.input_mut(|input| input.events = before);
     }
 
-    /// What was clicked on since the last call.
+    /// What was clicked on since the last call, as the viewer tells it.
     pub fn clicked(&mut self) -> Option<Clicked> {
-        self.clicked.borrow_mut().take()
+        let clicked = self.clicked.borrow_mut().take();
+        if clicked.is_some() && !self.is_foreign.load(Ordering::Relaxed) {
+            // It tells of changes alone: what stays selected could not be clicked again, and would keep its outline.
+            self.app.command_sender.send_system(SystemCommand::clear_selection());
+        }
+        clicked
+    }
+
+    /// The ray that a click in this frame follows, if it was on one of the window's own views inside `space`.
+    pub fn clicked_ray(&self, ctx: &egui::Context, space: egui::Rect) -> Option<Ray> {
+        if self.is_foreign.load(Ordering::Relaxed) { None } else { sight::clicked(ctx, space) }
     }
 
     /// Shows a recording in place of the window's own.
     pub fn open_recording(&mut self, path: &Path) {
         self.is_foreign.store(true, Ordering::Relaxed);
         self.asked = Some(Instant::now());
+        self.drop_foreign();
         self.app.open_url_or_file(&path.to_string_lossy());
+    }
+
+    /// Frees the memory of the recording that is shown, unless it is the window's own.
+    fn drop_foreign(&mut self) {
+        let shown = self.app.active_recording_id().map(|id| id.application_id().clone());
+        if let Some(foreign) = shown.filter(|app| app.as_str() != APPLICATION) {
+            self.app.command_sender.send_system(SystemCommand::CloseApp(foreign));
+        }
     }
 
     /// Whether a recording was asked for that is not there yet. One that does not come is not waited for.
@@ -172,11 +196,11 @@ impl Viewer {
         }
     }
 
-    /// Goes back to the window's own recording.
+    /// Goes back to the window's own recording, and lets the other one go.
     pub fn close_recording(&mut self) {
         self.is_foreign.store(false, Ordering::Relaxed);
         self.asked = None;
-        use re_viewer::external::re_viewer_context::{SystemCommand, SystemCommandSender as _};
+        self.drop_foreign();
         let own = re_log_types::ApplicationId::from(APPLICATION);
         self.app.command_sender.send_system(SystemCommand::ActivateApp(own));
     }

@@ -3,22 +3,23 @@
 //! The window never waits for it while it is open; [`super::threads`] waits once it is closed. A panic inside an order becomes an [`Event::Panicked`]; what was written to the
 //! episode's directory until then is whole.
 
-use super::half_belief::HalfBelief;
+mod reopen;
+pub mod told;
+
 use super::latest::words_of;
-use super::session::{Activity, Moment, SessionId, Setup};
+use super::session::{Activity, Moment, SessionId};
 use super::threads::Threads;
-use crate::driver::{Driver, update_of};
-use nudge_core::belief::BeliefUpdate;
-use nudge_core::camera::{ViewArray, hidden_objects};
-use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Overwrite, StepOutcome, review};
-use nudge_core::plan::{Action, Decision};
-use nudge_core::scene::{Catalog, ObjectId, Scene};
-use nudge_core::{Error, Result};
+use crate::driver::Driver;
+use nudge_core::Result;
+use nudge_core::episode::{EpisodeConfig, EpisodeRecord, Frames, Overwrite, StepRecord};
+use nudge_core::plan::Decision;
+use nudge_core::scene::{Catalog, Scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use told::{Brake, Post, Track, go_on, moment, setup};
 
 /// What a worker begins with.
 pub enum Begin {
@@ -72,56 +73,8 @@ impl Begin {
     }
 }
 
-/// What a worker tells.
-pub enum Event {
-    /// The episode is there.
-    Opened(Box<Opened>),
-    /// What it is at.
-    Activity(Activity),
-    /// What the policy would do.
-    Decided(Arc<Decision>),
-    /// A step is done.
-    Stepped(Arc<Moment>),
-    /// Something could not be done; the episode is as it was.
-    Failed(String),
-    /// The worker broke down; the episode takes no more orders.
-    Panicked(String),
-}
-
-/// An episode that has been opened.
-pub struct Opened {
-    /// Its directory.
-    pub path: PathBuf,
-    /// Scene, configuration, steps.
-    pub record: EpisodeRecord,
-    /// What does not change.
-    pub setup: Setup,
-    /// The states so far.
-    pub moments: Vec<Arc<Moment>>,
-    /// Why nothing more can be done with it, if it can only be looked at.
-    pub read_only: Option<String>,
-}
-
 pub use super::latest::Wake;
-
-/// What stops a worker before it has done all that it was told.
-#[derive(Default)]
-struct Brake {
-    /// Stop after the action that is under way.
-    paused: AtomicBool,
-    /// Stop as soon as can be; what has been decided is not done.
-    cancelled: AtomicBool,
-}
-
-impl Brake {
-    fn is_paused(&self) -> bool {
-        self.paused.load(Ordering::Relaxed) || self.is_cancelled()
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::Relaxed)
-    }
-}
+pub use told::{Checked, Event, Opened};
 
 /// The window's end of a worker.
 pub struct Worker {
@@ -150,9 +103,10 @@ impl Worker {
             .name(format!("episode {}", id.0))
             .spawn(move || {
                 before.into_iter().for_each(|thread| drop(thread.join()));
-                let broke = catch_unwind(AssertUnwindSafe(|| work(begin, catalog, &inbox, &post, &own)));
-                if let Err(panic) = broke {
-                    post.send(Event::Panicked(words_of(&*panic)));
+                let told = post.clone();
+                let work = AssertUnwindSafe(move || work(begin, catalog, &inbox, &post, &own));
+                if let Err(panic) = catch_unwind(move || beside_the_window(work)) {
+                    told.send(Event::Panicked(words_of(&*panic)));
                 }
             })
             .expect("a thread can be started");
@@ -164,12 +118,18 @@ impl Worker {
     pub fn order(&self, order: Order) {
         self.brake.paused.store(false, Ordering::Relaxed);
         self.brake.cancelled.store(false, Ordering::Relaxed);
+        self.brake.forgotten.store(false, Ordering::Relaxed);
         let _ = self.orders.send(order);
     }
 
     /// Stops a run after the action that it is at.
     pub fn pause(&self) {
         self.brake.paused.store(true, Ordering::Relaxed);
+    }
+
+    /// Leaves the orders that wait behind the check of a log.
+    pub fn forget(&self) {
+        self.brake.forgotten.store(true, Ordering::Relaxed);
     }
 
     /// Stops a run without doing what it decides just now, or an opening.
@@ -184,37 +144,34 @@ impl Drop for Worker {
     }
 }
 
-struct Post {
-    id: SessionId,
-    events: Sender<(SessionId, Event)>,
-    wake: Wake,
-}
-
-impl Post {
-    fn send(&self, event: Event) {
-        // Nobody listens any more once the window is closed.
-        let _ = self.events.send((self.id, event));
-        (self.wake)();
+/// Does an episode's work on all cores but one, which is the window's.
+fn beside_the_window(work: impl FnOnce() + Send) {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    match rayon::ThreadPoolBuilder::new().num_threads(cores.saturating_sub(1).max(1)).build() {
+        Ok(pool) => pool.install(work),
+        // Without threads of its own it shares everybody's.
+        Err(_) => work(),
     }
 }
 
-/// An episode that goes on, or one that can only be looked at.
-enum Track {
-    Writing(Box<Driver>),
-    Reading,
-}
-
 fn work(begin: Begin, catalog: Arc<Catalog>, inbox: &Receiver<Order>, post: &Post, brake: &Brake) {
-    let (mut track, mut latest) = match open(begin, catalog, post, brake) {
-        Ok((track, opened)) => {
-            let latest = opened.moments.last().expect("there is a prior").clone();
-            post.send(Event::Opened(Box::new(opened)));
-            (track, latest)
+    let begun = match begin {
+        Begin::Open { path, look_only } => reopen::reopen(&path, look_only, catalog, post, brake),
+        Begin::Start { scene, config, out } => begin_anew(*scene, *config, Vec::new(), &out, catalog, post, brake),
+        Begin::Branch { of, steps, out } => {
+            let shared = of.steps.into_iter().take(steps).collect();
+            begin_anew(of.scene, of.config, shared, &out, catalog, post, brake)
         }
+    };
+    let (mut track, mut latest) = match begun {
+        Ok(begun) => begun,
         Err(error) => return post.send(Event::Failed(error.to_string())),
     };
     post.send(Event::Activity(Activity::Idle));
     while let Ok(order) = inbox.recv() {
+        if brake.forgotten.load(Ordering::Relaxed) {
+            continue;
+        }
         let Track::Writing(driver) = &mut track else {
             post.send(Event::Failed("this episode is read only; branch from it to continue".to_owned()));
             continue;
@@ -266,146 +223,29 @@ fn act(driver: &mut Driver, decision: Decision, latest: &mut Arc<Moment>, post: 
     Ok(())
 }
 
-/// The state of an episode and what led to it; what has not changed since `before` is shared with it.
-fn moment(episode: &Episode, outcome: Option<StepOutcome>, before: Option<&Moment>) -> Moment {
-    let pushed = outcome.as_ref().is_none_or(|outcome| matches!(outcome.record.action, Action::Manipulate(_)));
-    let shared = before.filter(|_| !pushed);
-    Moment {
-        step: episode.record().steps.len(),
-        belief: HalfBelief::of(episode.belief()),
-        seen: Arc::new(episode.seen().clone()),
-        truth: shared.map_or_else(|| episode.truth().cloned().map(Arc::new), |before| before.truth.clone()),
-        bodies: shared.map_or_else(|| Arc::new(episode.bodies()), |before| before.bodies.clone()),
-        scores: match &outcome {
-            Some(outcome) => outcome.record.scores().copied(),
-            None => episode.record().prior.scores,
-        },
-        entropy_nats: outcome
-            .as_ref()
-            .map_or(episode.record().prior.entropy_nats, |outcome| outcome.record.entropy_nats),
-        outcome: outcome.map(Arc::new),
-    }
-}
-
-fn update_named(name: &str, config: &EpisodeConfig) -> Result<Arc<dyn BeliefUpdate>> {
-    crate::driver::belief_update(Some(name), config.policy)
-}
-
-fn open(begin: Begin, catalog: Arc<Catalog>, post: &Post, brake: &Brake) -> Result<(Track, Opened)> {
-    match begin {
-        Begin::Start { scene, config, out } => {
-            let update = update_named(&config.belief, &config)?;
-            let driver =
-                Driver::start(*scene, catalog, *config, update.clone(), &out, Overwrite::Refuse, Frames::Filed)?;
-            let moments = vec![Arc::new(moment(driver.episode(), None, None))];
-            let opened = opened(&out, driver.episode(), Some(update), moments, None)?;
-            Ok((Track::Writing(Box::new(driver)), opened))
-        }
-        Begin::Branch { of, steps, out } => {
-            let update = update_named(&of.config.belief, &of.config)?;
-            let mut driver =
-                Driver::start(of.scene, catalog, of.config, update.clone(), &out, Overwrite::Refuse, Frames::Filed)?;
-            let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
-            for (done, step) in of.steps.into_iter().take(steps).enumerate() {
-                progress(post, brake, done, steps)?;
-                let outcome = driver.act(step.decision)?;
-                let next = moment(driver.episode(), Some(outcome), moments.last().map(|moment| &**moment));
-                moments.push(Arc::new(next));
-            }
-            let opened = opened(&out, driver.episode(), Some(update), moments, None)?;
-            Ok((Track::Writing(Box::new(driver)), opened))
-        }
-        Begin::Open { path, look_only } => {
-            let record = EpisodeDir::open(&path)?.record()?;
-            let of = record.steps.len();
-            let look = |update: Option<Arc<dyn BeliefUpdate>>, why: String| {
-                let mut moments = Vec::with_capacity(of + 1);
-                let mut watch = watch(post, brake, of, &mut moments);
-                let (episode, difference) = review(&path, catalog.clone(), update.clone(), &mut watch)?;
-                drop(watch);
-                let reason = difference.map_or(why, |difference| {
-                    format!("repeating its actions gives another result here ({difference}); shown is what it holds")
-                });
-                Ok((Track::Reading, opened(&path, &episode, update, moments, Some(reason))?))
-            };
-            // Networks that are not here, cannot be read, or have other weights than those that made it.
-            let update = match update_of(&record.config.belief) {
-                Ok(Ok(update)) => match record.other_weights(&*update) {
-                    None => update,
-                    Some(words) => return look(None, format!("{words}; {HELD}")),
-                },
-                Ok(Err(why)) => return look(None, format!("{why}; {HELD}")),
-                Err(error) => return look(None, format!("{error}; {HELD}")),
-            };
-            if look_only {
-                return look(Some(update), "nothing in its directory shall change".to_owned());
-            }
-            let mut moments = Vec::with_capacity(of + 1);
-            let resumed =
-                Driver::resume(&path, catalog.clone(), update.clone(), &mut watch(post, brake, of, &mut moments));
-            match resumed {
-                Ok(driver) => {
-                    let opened = opened(&path, driver.episode(), Some(update), moments, None)?;
-                    Ok((Track::Writing(Box::new(driver)), opened))
-                }
-                // What cannot be written, is being written by another run, or is of another version or machine.
-                Err(refused @ (Error::Io { .. } | Error::Input { .. } | Error::Check(_))) => {
-                    look(Some(update), refused.to_string())
-                }
-                Err(error) => Err(error),
-            }
-        }
-    }
-}
-
-/// What an episode lacks whose belief update is not here.
-const HELD: &str =
-    "shown is what it holds: pushes are not predicted, and after one every voxel counts as unseen in Gains";
-
-/// Keeps every state of an episode that is being repeated, and tells how far it is.
-fn watch<'a>(
-    post: &'a Post,
-    brake: &'a Brake,
-    of: usize,
-    moments: &'a mut Vec<Arc<Moment>>,
-) -> impl FnMut(&Episode, Option<&StepOutcome>) -> Result<()> + 'a {
-    move |episode, outcome| {
-        progress(post, brake, episode.record().steps.len(), of)?;
-        let next = moment(episode, outcome.cloned(), moments.last().map(|moment| &**moment));
+/// Starts an episode, which repeats the steps that it shares with another.
+fn begin_anew(
+    scene: Scene,
+    config: EpisodeConfig,
+    steps: Vec<StepRecord>,
+    out: &Path,
+    catalog: Arc<Catalog>,
+    post: &Post,
+    brake: &Brake,
+) -> Result<(Track, Arc<Moment>)> {
+    let update = crate::driver::belief_update(Some(&config.belief), config.policy)?;
+    let mut driver = Driver::start(scene, catalog, config, update.clone(), out, Overwrite::Refuse, Frames::Filed)?;
+    let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
+    let shared = steps.len();
+    for (done, step) in steps.into_iter().enumerate() {
+        go_on(brake)?;
+        post.send(Event::Activity(Activity::Opening { done, of: shared }));
+        let outcome = driver.act(step.decision)?;
+        let next = moment(driver.episode(), Some(outcome), moments.last().map(|moment| &**moment));
         moments.push(Arc::new(next));
-        Ok(())
     }
-}
-
-fn progress(post: &Post, brake: &Brake, done: usize, of: usize) -> Result<()> {
-    if brake.is_cancelled() {
-        return Err(Error::Usage("cancelled".to_owned()));
-    }
-    post.send(Event::Activity(Activity::Opening { done, of }));
-    Ok(())
-}
-
-fn opened(
-    path: &Path,
-    episode: &Episode,
-    update: Option<Arc<dyn BeliefUpdate>>,
-    moments: Vec<Arc<Moment>>,
-    read_only: Option<String>,
-) -> Result<Opened> {
-    let record = episode.record().clone();
-    let views = ViewArray::named(&record.config.views)?;
-    let hidden = hidden_objects(&record.scene.shelf, &moments[0].bodies, &views);
-    let name = |id: &ObjectId| {
-        let object = record.scene.objects.get(usize::from(id.0));
-        format!("{}#{}", object.map_or("object", |object| object.class.as_str()), id.0)
-    };
-    let setup = Setup {
-        catalog: Arc::new(episode.catalog().clone()),
-        views: Arc::new(views),
-        update,
-        arm: episode.arm().clone(),
-        unreachable: Arc::new(episode.unreachable_views().to_vec()),
-        hidden: Arc::new(hidden.iter().map(name).collect()),
-    };
-    Ok(Opened { path: path.to_owned(), record, setup, moments, read_only })
+    let latest = moments[moments.len() - 1].clone();
+    let (record, setup) = (driver.episode().record().clone(), setup(driver.episode(), Some(update), &moments[0])?);
+    post.send(Event::Opened(Box::new(Opened { path: out.to_owned(), record, setup, moments, read_only: None })));
+    Ok((Track::Writing(Box::new(driver)), latest))
 }

@@ -3,17 +3,13 @@
 use super::{App, ChosenFor, Kept, Opening, Pair};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::{Dialog, Reply};
-use crate::workbench::model::{GainSource, LayoutKind, Preview};
-use crate::workbench::panels::weighed;
+use crate::workbench::model::LayoutKind;
 use crate::workbench::session::{Activity, Session, SessionId, branch_suffix};
 use crate::workbench::worker::{Begin, Order, Worker};
-use nudge_core::camera::ViewId;
 use nudge_core::episode::EpisodeConfig;
-use nudge_core::gain::RayDensity;
-use nudge_core::plan::{Action, Decision, Gain, PolicyKind, Reason};
+use nudge_core::plan::{Action, Decision, PolicyKind, Reason};
 use nudge_core::scene::Scene;
 use nudge_core::score::Verdict;
-use nudge_core::skill::{Manipulation, intended};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -42,7 +38,15 @@ impl App {
             Command::Act(decision) => self.order(Order::Act(decision), Activity::Acting),
             Command::Run => self.order(Order::Run, Activity::Running),
             Command::RunBoth => self.run_both(),
-            Command::Pause => self.stop(Worker::pause),
+            Command::Pause => {
+                self.stop(Worker::pause);
+                let shown: Vec<SessionId> = self.model.on_show().map(|session| session.id).collect();
+                for id in shown {
+                    if let Some(session) = self.model.session_of_mut(id) {
+                        session.pausing = session.activity == Activity::Running;
+                    }
+                }
+            }
             Command::Cancel => self.cancel(),
             Command::CancelOpening(id) => self.workers.get(&id).into_iter().for_each(Worker::cancel),
             Command::CancelTask(at) => self.tasks.under_way().get(at).into_iter().for_each(|task| task.cancel()),
@@ -174,6 +178,10 @@ impl App {
             Reply::Write(what, path, part) => {
                 self.dialog = None;
                 self.write(what, path, part);
+            }
+            Reply::Open(path) => {
+                self.dialog = None;
+                self.carry_out(Command::Open(path));
             }
             Reply::Export(id) => {
                 self.carry_out(Command::Show(id));
@@ -310,13 +318,18 @@ impl App {
         if session.read_only.is_some() {
             return Err((Level::Warning, "This episode is read only; branch from it to continue"));
         }
-        if session.activity != Activity::Idle {
-            return Err((Level::Info, "The episode is busy; cancel first"));
-        }
         if session.is_finished() {
             return Err((Level::Info, "The budget is used up; branch from an earlier step to continue"));
         }
-        session.activity = activity;
+        match session.activity {
+            Activity::Idle => session.activity = activity,
+            // What was decided before holds for what was filed; a decision or a run can wait for the check.
+            Activity::Checking { .. } if session.takes_orders() && matches!(order, Order::Decide | Order::Run) => {
+                session.queued = true;
+            }
+            Activity::Checking { .. } => return Err((Level::Info, "Its log is still being checked; wait for that")),
+            _ => return Err((Level::Info, "The episode is busy; cancel first")),
+        }
         worker.order(order);
         Ok(())
     }
@@ -347,7 +360,18 @@ impl App {
     /// Puts the brake on what is on the window.
     fn stop(&mut self, brake: impl Fn(&Worker)) {
         let shown: Vec<SessionId> = self.model.on_show().map(|session| session.id).collect();
-        shown.iter().filter_map(|id| self.workers.get(id)).for_each(brake);
+        for id in shown {
+            // The check of a log goes on; what waits behind it is left.
+            let checks = self.model.session_of(id).map(|session| matches!(session.activity, Activity::Checking { .. }));
+            match self.workers.get(&id) {
+                Some(worker) if checks == Some(true) => worker.forget(),
+                Some(worker) => brake(worker),
+                None => {}
+            }
+            if let Some(session) = self.model.session_of_mut(id) {
+                session.queued = false;
+            }
+        }
     }
 
     fn cancel(&mut self) {
@@ -370,59 +394,6 @@ impl App {
         let out = self.free_directory(&of.scene, &of.config, &branch_suffix(steps));
         let title = format!("{} from step {steps}", session.title());
         self.spawn(Opening { kept: Some(kept), ..Opening::of(title) }, Begin::Branch { of: Box::new(of), steps, out });
-    }
-
-    fn preview(&mut self, manipulation: Manipulation) {
-        let Some(session) = self.model.session() else { return };
-        let moment = session.moment(self.model.cursor).clone();
-        let (of, setup) = ((session.id, moment.step), session.setup.clone());
-        self.asked_preview = Some((of, manipulation));
-        let Some(update) = setup.update.clone() else { return };
-        self.background.preview.ask(move |_| {
-            let belief = moment.belief.belief();
-            let intervention = intended(&setup.arm, &belief, &manipulation);
-            let prediction = update.predict(&belief, std::slice::from_ref(&intervention)).pop()?;
-            let (prediction, swept) = (Arc::new(prediction), Arc::new(intervention.swept));
-            Some(Preview { of, manipulation, prediction, swept })
-        });
-    }
-
-    fn gain_of(&mut self, view: ViewId) {
-        self.model.view = Some(view);
-        let Some(session) = self.model.session() else { return };
-        let moment = session.moment(self.model.cursor).clone();
-        let (of, views) = ((session.id, moment.step), session.setup.views.clone());
-        let counted = session.record.config.planner.counted;
-        self.asked_gain = Some((of, view));
-        self.background.gain.ask(move |_| {
-            let gain = Gain::new(counted, &moment.belief.belief(), &moment.seen);
-            let nats = gain.per_voxel(&views, view, RayDensity::FULL);
-            Some(GainSource::new(of, view, nats))
-        });
-    }
-
-    /// Asks again where the chosen view's gain comes from, once the cursor has moved.
-    pub(super) fn follow_gain(&mut self) {
-        let at = self.model.session().map(|session| (session.id, self.model.cursor.min(session.steps())));
-        if let (true, Some(of), Some(view)) = (self.model.kept.layout.shows_gain(), at, self.model.view)
-            && self.asked_gain != Some((of, view))
-        {
-            self.gain_of(view);
-        }
-    }
-
-    /// In the layout of pushes, chooses the push of the decision at the cursor where none is chosen, and asks what the chosen
-    /// one would do.
-    pub(super) fn follow_push(&mut self) {
-        let Some(session) = self.model.session().filter(|_| self.model.kept.layout == LayoutKind::Push) else { return };
-        let of = (session.id, self.model.cursor.min(session.steps()));
-        let Some(decision) = session.decision_after(of.1) else { return };
-        let chosen = self.model.candidate.or_else(|| weighed::looked_at_first(decision));
-        let push = chosen.and_then(|at| decision.candidates.get(at)).map(|candidate| candidate.manipulation);
-        self.model.candidate = chosen;
-        if let Some(push) = push.filter(|push| self.asked_preview != Some((of, *push))) {
-            self.preview(push);
-        }
     }
 
     fn note(&mut self, step: usize, text: String) {

@@ -45,6 +45,9 @@ impl App {
             });
             self.layout(ui, frame, &mut ask);
         }
+        if let Some(ray) = self.ray.take() {
+            self.point(ray);
+        }
         self.over(&ctx, &mut ask);
         for command in ask {
             self.carry_out(command);
@@ -156,7 +159,7 @@ impl App {
             .show(ui, |ui| {
                 ui.add_space(4.0);
                 match layout {
-                    LayoutKind::Why => panels::why::show(ui, &mut self.model, ask),
+                    LayoutKind::Why => self.panels.why.show(ui, &mut self.model, ask),
                     LayoutKind::Gains => self.panels.gains.show(ui, &mut self.model, ask),
                     LayoutKind::Push => self.panels.push.show(ui, &mut self.model, ask),
                     LayoutKind::Compare => self.panels.compare.show(ui, &mut self.model, ask),
@@ -200,7 +203,11 @@ impl App {
         let started = Instant::now();
         self.parts.push((Part::Space, ui.available_rect_before_wrap()));
         match (&mut self.viewer, frame) {
-            (Some(viewer), Some(frame)) => viewer.ui(ui, frame),
+            (Some(viewer), Some(frame)) => {
+                let (ctx, space) = (ui.ctx().clone(), ui.available_rect_before_wrap());
+                viewer.ui(ui, frame);
+                self.ray = viewer.clicked_ray(&ctx, space);
+            }
             _ => {
                 egui::CentralPanel::default().show(ui, |ui| {
                     ui.centered_and_justified(|ui| {

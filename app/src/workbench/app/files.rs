@@ -1,6 +1,6 @@
 //! What is read and written: scenes, episodes and recordings that are opened, notes and scenes that are saved, exports.
 
-use super::{App, ChosenFor, Opening};
+use super::{App, Chosen, ChosenFor, Opening};
 use crate::workbench::annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::Dialog;
@@ -15,7 +15,10 @@ use crate::workbench::worker::Begin;
 use re_viewer::external::egui;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
+/// A file dialog that ends sooner, without a choice, was none.
+const TOO_FAST: Duration = Duration::from_millis(300);
 /// How many paths are remembered.
 const RECENT: usize = 12;
 
@@ -126,6 +129,7 @@ impl App {
     pub(super) fn browse(&mut self, what: MenuCommand, purpose: ChosenFor) {
         let (chosen, wake) = (self.chosen.0.clone(), self.wake.clone());
         let started = std::thread::Builder::new().name("file dialog".to_owned()).spawn(move || {
+            let started = Instant::now();
             let dialog = rfd::FileDialog::new().set_title(what.title().trim_end_matches('…'));
             let path = match what {
                 MenuCommand::OpenScene => dialog.add_filter("Scene", &["toml"]).pick_file(),
@@ -135,10 +139,14 @@ impl App {
                 MenuCommand::SaveSceneAs => dialog.add_filter("Scene", &["toml"]).save_file(),
                 _ => dialog.add_filter("Picture", &["png"]).save_file(),
             };
-            if let Some(path) = path {
-                let _ = chosen.send((purpose, path));
-                wake();
-            }
+            let told = match path {
+                Some(path) => Chosen::Path(purpose, path),
+                // Nobody closes a dialog that fast: there was none.
+                None if started.elapsed() < TOO_FAST => Chosen::NoDialog(purpose, what),
+                None => return,
+            };
+            let _ = chosen.send(told);
+            wake();
         });
         if let Err(error) = started {
             self.tell(Level::Error, format!("No file dialog: {error}"));
@@ -241,6 +249,9 @@ impl App {
     }
 
     fn export(&mut self, what: MenuCommand, session: Session, path: PathBuf) {
+        if session.moments.iter().any(|moment| !moment.is_whole) {
+            return self.tell(Level::Warning, "Its log is still being checked; export it once that is done");
+        }
         let title = format!("Exporting to {}", path.display());
         self.task(title, move |watch| {
             let written = if what == MenuCommand::ExportTables {

@@ -1,16 +1,17 @@
 //! What comes in every frame: events of workers, answers of jobs, clicks in the viewer, keys, dropped files.
 
-use super::{App, ChosenFor};
+use super::{App, Chosen, ChosenFor};
 use crate::workbench::annotations::Annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::derive::Derived;
 use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, Picked};
 use crate::workbench::part::Part;
+use crate::workbench::ray::Ray;
 use crate::workbench::session::{Activity, Session, SessionId};
-use crate::workbench::space::{Side, Space};
+use crate::workbench::space::{Side, Space, at, hit};
 use crate::workbench::viewer::{Clicked, Viewer};
-use crate::workbench::worker::{Event, Opened};
+use crate::workbench::worker::{Checked, Event, Opened};
 use re_viewer::external::egui;
 use std::sync::{Arc, PoisonError};
 
@@ -34,6 +35,7 @@ impl App {
         self.pair_up();
         self.follow_gain();
         self.follow_push();
+        self.follow_changes();
         self.derive();
         self.space();
         self.quitting(ctx);
@@ -45,10 +47,25 @@ impl App {
             // One that was closed meanwhile has no worker any more.
             Event::Opened(opened) if self.workers.contains_key(&id) => self.opened(id, *opened),
             Event::Opened(_) => {}
+            Event::Repeated(moment) => {
+                let session = self.model.session_of_mut(id);
+                if let Some(shown) = session.and_then(|session| session.moments.get_mut(moment.step)) {
+                    *shown = moment;
+                }
+            }
+            Event::Checked(checked) => self.checked(id, *checked),
+            Event::Unchecked(words) => {
+                if let Some(session) = self.model.session_of_mut(id) {
+                    session.read_only = Some(words.clone());
+                }
+                self.model.toasts.tell(Level::Error, words);
+            }
             Event::Activity(activity) => {
                 if let Some(opening) = self.openings.get_mut(&id) {
                     opening.activity = activity;
                 } else if let Some(session) = self.model.session_of_mut(id) {
+                    session.queued &= matches!(activity, Activity::Checking { .. });
+                    session.pausing &= activity != Activity::Idle;
                     session.activity = activity;
                 }
             }
@@ -94,6 +111,16 @@ impl App {
         }
     }
 
+    /// Takes over what repeating the log of an opened episode brought.
+    fn checked(&mut self, id: SessionId, checked: Checked) {
+        let reason = checked.read_only.clone().filter(|_| !self.options.look_only);
+        let Some(session) = self.model.session_of_mut(id) else { return };
+        (session.record, session.setup, session.read_only) = (checked.record, checked.setup, checked.read_only);
+        if let Some(reason) = reason {
+            self.model.toasts.tell(Level::Warning, format!("Opened read only: {reason}"));
+        }
+    }
+
     fn opened(&mut self, id: SessionId, opened: Opened) {
         let opening = self.openings.remove(&id);
         if let Some(path) = opening.as_ref().and_then(|opening| opening.remember.as_ref()) {
@@ -106,10 +133,13 @@ impl App {
                 Annotations::default()
             }
         };
-        if let Some(reason) = opened.read_only.as_ref().filter(|_| !self.options.look_only) {
-            self.model.toasts.tell(Level::Warning, format!("Opened read only: {reason}"));
-        }
         let steps = opened.moments.len() - 1;
+        let is_whole = opened.moments.iter().all(|moment| moment.is_whole);
+        let activity = if is_whole {
+            Activity::Opening { done: steps, of: steps }
+        } else {
+            Activity::Checking { done: 0, of: steps }
+        };
         self.model.sessions.push(Session {
             id,
             path: opened.path,
@@ -117,7 +147,9 @@ impl App {
             setup: opened.setup,
             moments: opened.moments,
             pending: opening.as_ref().and_then(|opening| opening.kept.as_ref()?.decision.clone()),
-            activity: Activity::Opening { done: steps, of: steps },
+            activity,
+            queued: false,
+            pausing: false,
             read_only: opened.read_only,
             annotations,
             unsaved: false,
@@ -142,6 +174,9 @@ impl App {
         if let Some((_, preview)) = background.preview.take() {
             self.model.preview = Some(preview);
         }
+        if let Some((_, (of, largest))) = background.changes.take() {
+            self.model.largest = Some((of, Arc::new(largest)));
+        }
         if let Some((_, source)) = background.gain.take() {
             self.model.gain_source = Some(source);
         }
@@ -151,35 +186,59 @@ impl App {
         for (level, words) in self.tasks.ended() {
             self.model.toasts.tell(level, words);
         }
-        while let Ok((purpose, path)) = self.chosen.1.try_recv() {
-            match (purpose, &mut self.dialog) {
-                (ChosenFor::Opening, _) => self.carry_out(Command::Open(path)),
-                (ChosenFor::Dialog, Some(dialog)) => dialog.chosen(&path),
-                (ChosenFor::Dialog, None) => {}
+        while let Ok(chosen) = self.chosen.1.try_recv() {
+            match (chosen, &mut self.dialog) {
+                (Chosen::Path(ChosenFor::Opening, path), _) => self.carry_out(Command::Open(path)),
+                (Chosen::Path(ChosenFor::Dialog, path), Some(dialog)) => dialog.chosen(&path),
+                (Chosen::Path(ChosenFor::Dialog, _), None) => {}
+                (Chosen::NoDialog(ChosenFor::Opening, what), _) => {
+                    self.dialog = Some(Dialog::OpenPath { what, path: String::new() });
+                }
+                (Chosen::NoDialog(ChosenFor::Dialog, _), _) => {
+                    let words = "No file dialog of the system answered here: type the path";
+                    self.model.toasts.tell(Level::Warning, words);
+                }
             }
         }
     }
 
-    /// A click in three dimensions asks about the voxel.
+    /// A click in three dimensions asks about the voxel under the pointer, or, in Why, about the floor cell where no voxel is.
+    pub(super) fn point(&mut self, ray: Ray) {
+        let layout = self.model.kept.layout;
+        let Some(moment) = self.model.moment() else { return };
+        let found = hit::first(moment.belief.grid(), &self.drawn, at::BELIEF, ray);
+        let voxel = found.filter(|found| matches!(found, Picked::Voxel(_)));
+        match layout {
+            LayoutKind::Why if found.is_some() => self.carry_out(Command::Pick(found)),
+            // What lies in front of the voxel may be meant: the viewer tells in a later frame.
+            LayoutKind::Episode if self.model.kept.display.views || self.model.kept.display.pushes => {
+                self.pointed = voxel;
+            }
+            LayoutKind::Episode if voxel.is_some() => self.carry_out(Command::Pick(voxel)),
+            _ => {}
+        }
+    }
+
+    /// A click in three dimensions, as the viewer tells it.
     fn click(&mut self, clicked: &Clicked) {
-        if self.model.recording.is_some() {
-            // Of a foreign recording nothing is known but what the viewer shows.
+        let pointed = self.pointed.take();
+        if self.model.recording.is_some() || self.model.kept.layout == LayoutKind::Why {
+            // Of a foreign recording nothing is known but what the viewer shows; in Why only voxels and cells are asked about.
             return;
         }
-        let voxel = clicked.instance.and_then(|instance| self.drawn.voxel(&clicked.entity, instance));
-        if let Some(voxel) = voxel {
-            self.carry_out(Command::Pick(Some(Picked::Voxel(voxel))));
-        } else if clicked.entity == crate::workbench::space::at::VIEWS
+        if clicked.entity == at::VIEWS
             && let Some(view) = clicked.instance
         {
             self.carry_out(Command::GainOf(nudge_core::camera::ViewId(view as u16)));
-        } else if clicked.entity == crate::workbench::space::at::CANDIDATES {
+        } else if clicked.entity == at::CANDIDATES {
             self.model.candidate = clicked.instance;
             let decision = self.model.session().and_then(|session| session.decision_after(self.model.cursor));
             let candidate = clicked.instance.and_then(|at| decision?.candidates.get(at));
             if let Some(push) = candidate.map(|candidate| candidate.manipulation) {
                 self.carry_out(Command::Preview(push));
             }
+        } else if pointed.is_some() {
+            self.carry_out(Command::Pick(pointed));
         }
     }
 
@@ -303,8 +362,16 @@ impl App {
         let kept = &model.kept;
         let motion_s =
             model.session().and_then(|session| model.scrubbed.at_s((session.id, model.cursor.min(session.steps()))));
+        // What repeating an opened episode's actions brings is drawn once it is there.
+        let is_whole = |session: Option<&Session>| {
+            session.map(|session| {
+                let from = model.cursor.saturating_sub(1).min(session.steps());
+                session.moments[from..].iter().take(3).map(|moment| moment.is_whole).collect::<Vec<_>>()
+            })
+        };
+        let whole = [is_whole(model.session()), is_whole(model.other_session())];
         let key = format!(
-            "{motion_s:?} {:?} {aspect:.2} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            "{motion_s:?} {whole:?} {:?} {aspect:.2} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             kept.layout,
             kept.light,
             model.session().map(|session| (session.id, session.steps(), session.pending.is_some())),

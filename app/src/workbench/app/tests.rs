@@ -1,7 +1,7 @@
 //! What only happens when something breaks, driven through the window. The rest is tested from outside, in `tests/`.
 
-use super::{App, FormOptions, Options};
-use crate::workbench::command::Command;
+use super::{App, Chosen, ChosenFor, FormOptions, Options};
+use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::dialog::Dialog;
 use crate::workbench::model::{LayoutKind, StartForm};
 use crate::workbench::part::Part;
@@ -199,4 +199,92 @@ fn an_episode_of_other_weights_opens_to_be_looked_at_and_says_so() {
     assert_eq!(is_told, nudge_core::cnabu::AVAILABLE, "{reason}");
     // Nothing is repeated with weights that it was not made with, and no push predicted.
     assert!(session.steps() == 2 && session.setup.update.is_none());
+}
+
+/// Reopens the episode of a window, and stops as soon as it is shown.
+fn shown_again(harness: &mut Harness<'_, App>) -> PathBuf {
+    let (id, path) = harness.state().model.session().map(|session| (session.id, session.path.clone())).expect("open");
+    harness.state_mut().ask(Command::Close(id));
+    harness.run_steps(3);
+    harness.state_mut().ask(Command::Open(path.clone()));
+    let started = Instant::now();
+    while harness.state().model.session().is_none() {
+        assert!(started.elapsed() < Duration::from_secs(60), "it is not shown");
+        std::thread::sleep(Duration::from_millis(1));
+        harness.step();
+    }
+    path
+}
+
+#[test]
+fn a_finished_episode_is_shown_before_its_log_is_repeated() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 3);
+    harness.state_mut().ask(Command::Run);
+    wait(&mut harness);
+    let before = harness.state().model.session().expect("open").moments.clone();
+    shown_again(&mut harness);
+    let session = harness.state().model.session().expect("shown").clone();
+    assert!(matches!(session.activity, Activity::Checking { .. }), "{:?}", session.activity);
+    assert_eq!(session.moments.len(), before.len());
+    for (moment, was) in session.moments.iter().zip(&before) {
+        assert!(moment.belief == was.belief, "step {}", was.step);
+        assert_eq!((moment.scores, moment.entropy_nats), (was.scores, was.entropy_nats));
+        let same = moment.frame.as_ref().map(|frame| frame.frame()) == was.frame.as_ref().map(|frame| frame.frame());
+        assert!(same, "the image of step {}", was.step);
+    }
+    wait(&mut harness);
+    let session = harness.state().model.session().expect("shown");
+    assert!(session.read_only.is_none() && session.activity == Activity::Idle);
+    for (moment, was) in session.moments.iter().zip(&before) {
+        assert!(moment.is_whole && moment.belief == was.belief && moment.bodies.len() == was.bodies.len());
+        assert!(moment.seen.iter().eq(was.seen.iter()), "step {}", was.step);
+    }
+    assert!(session.setup.hidden.is_some() && session.setup.update.is_some());
+}
+
+#[test]
+fn who_goes_on_with_a_reopened_episode_is_heard_once_its_log_is_checked() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 3);
+    for _ in 0..2 {
+        harness.state_mut().ask(Command::DoIt);
+        wait(&mut harness);
+    }
+    shown_again(&mut harness);
+    assert!(matches!(harness.state().model.session().expect("shown").activity, Activity::Checking { .. }));
+    // What is decided now would be another state's: only a decision or a run waits.
+    harness.state_mut().ask(Command::Decide);
+    assert!(harness.state().model.session().expect("shown").queued);
+    assert!(!MenuCommand::Run.is_available(&harness.state().model), "one order waits");
+    wait(&mut harness);
+    let session = harness.state().model.session().expect("shown");
+    assert!(session.pending.is_some() && !session.queued && session.steps() == 1);
+    // And what waits is left when a person says so.
+    shown_again(&mut harness);
+    harness.state_mut().ask(Command::Run);
+    harness.state_mut().ask(Command::Cancel);
+    wait(&mut harness);
+    let session = harness.state().model.session().expect("shown");
+    assert_eq!((session.steps(), session.queued), (1, false));
+}
+
+#[test]
+fn without_a_file_dialog_a_path_is_typed() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 1);
+    let open = MenuCommand::OpenScene;
+    harness.state().chosen.0.send(Chosen::NoDialog(ChosenFor::Opening, open)).expect("sent");
+    harness.run_steps(3);
+    assert!(harness.query_by_label_contains("No file dialog of the system answered here").is_some());
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes/demo/behind-the-boxes.toml");
+    harness.get_by_label("Path").focus();
+    harness.run_steps(2);
+    harness.get_by_label("Path").type_text(&scene.to_string_lossy());
+    harness.run_steps(2);
+    harness.get_by_label("Open").click();
+    harness.run_steps(2);
+    wait(&mut harness);
+    assert!(harness.state().dialog().is_none());
+    assert_eq!(harness.state().model.session().expect("open").record.scene.name, "behind-the-boxes");
 }

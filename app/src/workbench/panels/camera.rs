@@ -15,6 +15,7 @@ use re_viewer::external::egui::{
     Tooltip, Ui, WidgetInfo, WidgetType, pos2, vec2,
 };
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// The depth image where the sensor gave nothing.
 const NO_DEPTH_RGB: Rgb = [64, 34, 54];
@@ -31,6 +32,8 @@ enum Shown {
 #[derive(Default)]
 pub struct State {
     textures: Textures<(SessionId, usize, Shown)>,
+    /// The last image, unpacked.
+    frame: Option<((SessionId, usize), Arc<Frame>)>,
     /// The classes in the last label image.
     seen: Option<(SessionId, usize, Vec<ClassId>)>,
 }
@@ -48,9 +51,15 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model) {
     let mut moments = session.moments[..=until].iter().rev();
     let found = moments.find_map(|moment| {
         let outcome = moment.outcome.as_ref()?;
-        Some((moment.step, outcome.record.action, outcome.frame.as_ref()?))
+        Some((moment.step, outcome.record.action, moment.frame.as_ref()?))
     });
-    let Some((step, action, frame)) = found else {
+    let unpacked = found.and_then(|(step, action, packed)| {
+        let known = state.frame.take().filter(|(of, _)| *of == (session.id, step)).map(|(_, frame)| frame);
+        let frame = known.or_else(|| packed.frame().map(Arc::new))?;
+        state.frame = Some(((session.id, step), frame.clone()));
+        Some((step, action, frame))
+    });
+    let Some((step, action, frame)) = unpacked else {
         return empty(ui, "No image yet: decide, or choose a view to look from");
     };
     let when =
@@ -73,7 +82,7 @@ fn draw(state: &mut State, ui: &mut Ui, model: &Model) {
             for &shown in shown {
                 ui.vertical(|ui| {
                     ui.set_width(width);
-                    one(state, ui, session, step, frame, shown, range);
+                    one(state, ui, session, step, &frame, shown, range);
                 });
             }
         });

@@ -4,6 +4,7 @@
 use super::floor::in_window;
 use super::words;
 use crate::colors;
+use crate::workbench::changes::{CHANGED, shares};
 use crate::workbench::model::Picked;
 use crate::workbench::session::{Moment, Session};
 use nudge_core::belief::{CNABU, beta_mean};
@@ -11,12 +12,10 @@ use nudge_core::camera::UNOBSERVED;
 use nudge_core::episode::StepOutcome;
 use nudge_core::grid::{Grid, VoxelSet};
 use nudge_core::plan::Action;
-use nudge_core::scene::{CLASS_COUNT, ClassId};
+use nudge_core::scene::{CLASS_COUNT, Catalog, ClassId};
 
 /// A predicted probability of change below this is not worth a line.
 const WORTH_TELLING: f32 = 0.01;
-/// A change of a probability above this has a line, whatever made it.
-const CHANGED: f32 = 0.02;
 
 /// A step that changed what was asked about.
 pub struct Change {
@@ -33,12 +32,13 @@ pub struct Change {
 /// The steps that changed a voxel or a cell, which must be the grid's.
 pub fn of(session: &Session, picked: Picked) -> Vec<Change> {
     let grid = *session.moment(0).belief.grid();
-    let (cell, voxel) = match picked {
-        Picked::Voxel(voxel) => (voxel / grid.dims[2], Some(voxel)),
-        Picked::Cell(cell) => (cell, None),
-    };
-    let subject = Subject { session, grid, cell, voxel };
+    let subject = Subject::of(&session.setup.catalog, &session.record.config.belief, grid, picked);
     session.moments.windows(2).filter_map(|pair| subject.change(&pair[0], &pair[1])).collect()
+}
+
+/// What made the change of a voxel or a cell, which must be the grid's, from one state to the next, in words.
+pub fn of_step(catalog: &Catalog, update: &str, [before, after]: [&Moment; 2], picked: Picked) -> String {
+    Subject::of(catalog, update, *after.belief.grid(), picked).causes(before, after, true).join(", ")
 }
 
 /// The probability of a cell's likeliest class.
@@ -49,14 +49,25 @@ pub fn certainty(moment: &Moment, cell: usize) -> f32 {
 
 /// What is asked about.
 struct Subject<'a> {
-    session: &'a Session,
+    catalog: &'a Catalog,
+    /// The belief update's name.
+    update: &'a str,
     grid: Grid,
     cell: usize,
     /// `None` for the whole column.
     voxel: Option<usize>,
 }
 
-impl Subject<'_> {
+impl<'a> Subject<'a> {
+    /// A voxel or a cell, which must be the grid's.
+    fn of(catalog: &'a Catalog, update: &'a str, grid: Grid, picked: Picked) -> Self {
+        let (cell, voxel) = match picked {
+            Picked::Voxel(voxel) => (voxel / grid.dims[2], Some(voxel)),
+            Picked::Cell(cell) => (cell, None),
+        };
+        Self { catalog, update, grid, cell, voxel }
+    }
+
     fn change(&self, before: &Moment, after: &Moment) -> Option<Change> {
         let outcome = after.outcome.as_ref()?;
         let number = |moment: &Moment| match self.voxel {
@@ -64,9 +75,28 @@ impl Subject<'_> {
             None => certainty(moment, self.cell),
         };
         let from_to = [number(before), number(after)];
+        let mut changed = (from_to[1] - from_to[0]).abs() > CHANGED;
+        if self.voxel.is_none() {
+            let [from, to] = [before, after].map(|moment| shares(&moment.belief.cell(self.cell)));
+            changed |= from.iter().zip(to).any(|(from, to)| (to - from).abs() > CHANGED);
+        }
+        let causes = self.causes(before, after, changed);
+        let action = match outcome.record.action {
+            Action::Look { view } => format!("look from view {}", view.0),
+            Action::Manipulate(done) => done.kind().name().to_owned(),
+        };
+        (!causes.is_empty()).then_some(Change { step: after.step, action, causes, from_to })
+    }
+
+    /// What a step did to it, in words; of one that changed it there is at least one.
+    fn causes(&self, before: &Moment, after: &Moment, changed: bool) -> Vec<String> {
+        let Some(outcome) = after.outcome.as_ref() else { return Vec::new() };
+        if !after.is_whole {
+            return if changed { vec!["not known until its log is checked".to_owned()] } else { Vec::new() };
+        }
         let mut causes = self.seen(outcome);
         causes.extend(self.pushed(outcome));
-        if causes.is_empty() && (from_to[1] - from_to[0]).abs() > CHANGED {
+        if causes.is_empty() && changed {
             causes.push(self.unseen(outcome));
         }
         let label = |moment: &Moment| moment.truth.as_ref()?.labels.get(self.cell).copied();
@@ -75,11 +105,7 @@ impl Subject<'_> {
         {
             causes.push(format!("what stands there became {}", self.class(label)));
         }
-        let action = match outcome.record.action {
-            Action::Look { view } => format!("look from view {}", view.0),
-            Action::Manipulate(done) => done.kind().name().to_owned(),
-        };
-        (!causes.is_empty()).then_some(Change { step: after.step, action, causes, from_to })
+        causes
     }
 
     /// What a look saw of it.
@@ -130,7 +156,7 @@ impl Subject<'_> {
 
     /// What changed it although the step neither saw nor moved it: the belief update itself.
     fn unseen(&self, outcome: &StepOutcome) -> String {
-        let update = if self.session.record.config.belief == CNABU { "network" } else { "belief update" };
+        let update = if self.update == CNABU { "network" } else { "belief update" };
         match outcome.record.action {
             Action::Look { .. } => format!("{update}, not seen"),
             Action::Manipulate(_) => format!("{update}, neither swept nor predicted to change"),
@@ -138,6 +164,6 @@ impl Subject<'_> {
     }
 
     fn class(&self, label: u8) -> String {
-        colors::class_title(&self.session.setup.catalog, ClassId(label))
+        colors::class_title(self.catalog, ClassId(label))
     }
 }

@@ -71,6 +71,12 @@ pub fn nothing(ui: &mut Ui, session: &Session, what: &str, ask: &mut Vec<Command
         if ui.add_enabled(possible, Button::new(title)).on_hover_text("Shows what was weighed").clicked() {
             ask.push(command);
         }
+        if !session.is_finished() && session.steps() > 0 {
+            let hint = "Goes to the state before the last action, with what was weighed there";
+            if ui.button("See the last decision").on_hover_text(hint).clicked() {
+                ask.push(Command::GoTo(session.steps() - 1));
+            }
+        }
     });
     ui.add_space(8.0);
 }
@@ -130,7 +136,11 @@ fn views(
     touched: &mut Touched,
     ask: &mut Vec<Command>,
 ) {
-    heading(ui, "Best views", "The ten views with the largest gain under the belief before the step");
+    heading(
+        ui,
+        "Best views",
+        "The ten views with the largest gain under the belief before the step, and the best pair",
+    );
     if decision.gains.is_empty() {
         ui.weak("This policy weighs no views");
     } else {

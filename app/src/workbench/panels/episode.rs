@@ -17,6 +17,10 @@ static MISSING: LazyLock<BTreeMap<&str, String>> = LazyLock::new(|| {
     BELIEFS.into_iter().filter_map(|name| Some((name, reason(name)?))).collect()
 });
 
+/// What is done with an episode that was opened.
+const CHECKING: &str = "Shown is what its files hold. Its actions are repeated in the background: that compares every \
+                        state with the files, and brings what they do not hold (what rays met, where pushes left things)";
+
 /// Draws the episodes that are being opened, each with its progress.
 pub fn openings(ui: &mut egui::Ui, openings: &[(SessionId, String, Activity)], ask: &mut Vec<Command>) {
     for (id, title, activity) in openings {
@@ -57,12 +61,14 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
     }
     super::untold(ui, &session.record);
     if session.record.has_truth() {
-        let hidden = session.setup.hidden.len();
-        ui.label(format!("{} objects, {hidden} hidden", scene.objects.len())).on_hover_text(if hidden == 0 {
-            "Every object shows in at least one of the candidate views".to_owned()
-        } else {
-            format!("No candidate view shows 25 pixels or more of: {}", session.setup.hidden.join(", "))
-        });
+        let hidden = session.setup.hidden.as_deref();
+        let count = hidden.map_or("…".to_owned(), |hidden| hidden.len().to_string());
+        let words = match hidden {
+            None => "The objects that no candidate view shows are being counted".to_owned(),
+            Some(hidden) if hidden.is_empty() => "Every object shows in at least one of the candidate views".to_owned(),
+            Some(hidden) => format!("No candidate view shows 25 pixels or more of: {}", hidden.join(", ")),
+        };
+        ui.label(format!("{} objects, {count} hidden", scene.objects.len())).on_hover_text(words);
     }
     let mut facts = vec![
         ("policy", config.policy.to_string()),
@@ -106,12 +112,19 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
         Activity::Idle if session.pending.is_some() => "decided",
         Activity::Idle => "ready",
         Activity::Opening { .. } => "opening",
+        Activity::Checking { .. } => "checking",
         Activity::Deciding => "deciding…",
         Activity::Acting => "acting…",
+        Activity::Running if session.pausing => "pauses after this action",
         Activity::Running => "running…",
     };
     let words = format!("{steps} of {budget} actions · {doing}");
     super::progress(ui, steps as f32 / budget.max(1) as f32, &words).on_hover_text("Actions done of the budget");
+    if let Activity::Checking { done, of } = session.activity {
+        let then = if session.queued { ", then it goes on" } else { "" };
+        let words = format!("checking step {done} of {of}{then}");
+        super::progress(ui, done as f32 / of.max(1) as f32, &words).on_hover_text(CHECKING);
+    }
 }
 
 fn form(ui: &mut egui::Ui, model: &mut Model, ask: &mut Vec<Command>) {

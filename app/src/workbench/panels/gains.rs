@@ -9,7 +9,7 @@ use crate::workbench::model::{GainSource, Hovered, Model};
 use crate::workbench::session::{Session, SessionId};
 use nudge_core::camera::{View, ViewArray, ViewId};
 use nudge_core::grid::Grid;
-use nudge_core::plan::Decision;
+use nudge_core::plan::{Counted, Decision};
 use re_viewer::external::egui::{
     self, Align2, Color32, Painter, Rect, RichText, Sense, Stroke, StrokeKind, Tooltip, Ui, WidgetInfo, WidgetType,
     pos2, vec2,
@@ -251,7 +251,12 @@ fn spread(state: &mut State, ui: &mut Ui, model: &Model, session: &Session, view
         }
     }
     let Some(spread) = state.spread.as_ref().filter(|spread| spread.of == key) else {
-        ui.weak("Click the view to ask where its gain comes from");
+        let known = session.moment(step).is_whole;
+        ui.weak(if known {
+            "Click the view to ask where its gain comes from"
+        } else {
+            "Where its gain comes from is known once the episode's log is checked"
+        });
         return;
     };
     let [_, depth_m, height_m] = session.moment(step).belief.grid().size_m();
@@ -282,7 +287,11 @@ fn spread(state: &mut State, ui: &mut Ui, model: &Model, session: &Session, view
             });
         }
     });
-    ui.label(RichText::new(format!("{} from all voxels together", words::nats(spread.total))).small().weak());
+    let counted = match session.record.config.planner.counted {
+        Counted::All => "all voxels",
+        Counted::Unseen => "all unseen voxels",
+    };
+    ui.label(RichText::new(format!("{} from {counted} together", words::nats(spread.total))).small().weak());
 }
 
 impl Spread {

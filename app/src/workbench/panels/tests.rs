@@ -22,7 +22,7 @@ const PANELS: [(&str, Make); 8] = [
     ("camera", || Box::new(camera::State::default())),
     ("curves", || Box::new(curves::show)),
     ("decision", || Box::new(decision::State::default())),
-    ("why", || Box::new(why::show)),
+    ("why", || Box::<why::State>::default()),
     ("gains", || Box::new(gains::State::default())),
     ("push", || Box::new(push::State::default())),
     ("compare", || Box::new(compare::State::default())),
@@ -260,7 +260,7 @@ fn why_tells_the_causes_of_a_swept_voxel() {
     let swept = &outcome.swept.as_ref().expect("step 4 is a push").swept;
     let voxel = swept.iter().nth(swept.len() / 2).expect("sweeps something");
     model.picked = Some(Picked::Voxel(voxel));
-    let mut harness = harness(why::show, model);
+    let mut harness = harness(why::State::default(), model);
     assert!(has(&harness, "Voxel at") && has(&harness, "step 4, push: swept"));
     harness.query_all_by_label_contains("step 4, push: swept").next().expect("cause").click();
     harness.run_steps(2);
@@ -291,9 +291,89 @@ fn why_tells_of_a_change_that_a_network_made_without_seeing() {
     let belief = crate::workbench::half_belief::HalfBelief::of(&belief);
     model.sessions[0].moments[2] = Arc::new(Moment { belief, ..(*moment).clone() });
     model.picked = Some(Picked::Voxel(voxel));
-    let harness = harness(why::show, model);
+    let harness = harness(why::State::default(), model);
     assert!(has(&harness, &format!("step 2, look from view {}: network, not seen", view.0)));
     assert!(has(&harness, "→ 0.80"));
+}
+
+#[test]
+fn the_largest_changes_of_a_step_are_sorted_and_clicked() {
+    let mut model = fixture::model();
+    let session = &model.sessions[0];
+    let (before, after) = (&session.moments[1], &session.moments[2]);
+    let cause =
+        |picked| causes::of_step(&session.setup.catalog, &session.record.config.belief, [before, after], picked);
+    let largest = crate::workbench::changes::largest(before, after, cause);
+    let (voxel, cell) = (largest.voxels[0].clone(), largest.cells[0].clone());
+    model.largest = Some(((session.id, 2, true), Arc::new(largest)));
+    model.cursor = 2;
+    let mut harness = harness(why::State::default(), model);
+    assert!(has(&harness, "Largest changes of step 2"));
+    let first = |harness: &Harness<'_, Stage>, of: &str| {
+        let name = format!("Change of {of}");
+        let rows = harness.query_all_by_label_contains(&name);
+        let top = rows.min_by(|a, b| a.rect().top().total_cmp(&b.rect().top())).expect("rows");
+        (top.accesskit_node().label().expect("named"), top.rect().center())
+    };
+    let (largest, at) = first(&harness, "voxel");
+    let [from, to] = voxel.from_to.map(words::probability);
+    assert!(largest.ends_with(&format!("{from} → {to}")), "{largest}");
+    click_at(&mut harness, at);
+    let picked = |command: &Command| match command {
+        Command::Pick(picked) => *picked,
+        _ => None,
+    };
+    assert_eq!(asked(&harness, picked), Some(voxel.of));
+    // Of a classical look all have changed by the same, but not at the same place.
+    let mut tops = Vec::new();
+    for _ in 0..2 {
+        harness.get_by_label("Sort by x, y, z m").click();
+        harness.run_steps(3);
+        tops.push(first(&harness, "voxel").0);
+    }
+    assert_ne!(tops[0], tops[1], "falling, then rising");
+    harness.get_by_label("floor cells").click();
+    harness.run_steps(3);
+    let (_, at) = first(&harness, "floor cell");
+    click_at(&mut harness, at);
+    assert_eq!(asked(&harness, picked), Some(cell.of));
+}
+
+#[test]
+fn causes_are_not_made_up_before_a_log_is_checked() {
+    let mut model = fixture::model();
+    let moments = &mut model.sessions[0].moments;
+    let voxel = moments[1].outcome.as_ref().and_then(|outcome| outcome.observation.as_ref()).expect("a look");
+    let voxel = voxel.occupied.iter().next().expect("something was seen");
+    for moment in moments.iter_mut() {
+        let outcome = moment.outcome.as_deref().cloned();
+        let outcome =
+            outcome.map(|outcome| Arc::new(nudge_core::episode::StepOutcome { observation: None, ..outcome }));
+        *moment = Arc::new(Moment { is_whole: false, outcome, ..(**moment).clone() });
+    }
+    model.picked = Some(Picked::Voxel(voxel));
+    let harness = harness(why::State::default(), model);
+    assert!(has(&harness, "not known until its log is checked") && !has(&harness, "not seen"));
+}
+
+#[test]
+fn a_run_that_pauses_says_so() {
+    let mut model = fixture::model();
+    model.sessions[0].activity = Activity::Running;
+    model.sessions[0].pausing = true;
+    let harness = harness(episode::show, model);
+    assert!(has(&harness, "pauses after this action"));
+    assert!(harness.get_by_label("Pause").accesskit_node().is_disabled());
+}
+
+#[test]
+fn the_last_decision_can_be_seen_again_before_the_next_is_made() {
+    let mut model = fixture::model();
+    model.sessions[0].pending = None;
+    let mut harness = harness(decision::State::default(), model);
+    harness.get_by_label("See the last decision").click();
+    harness.run_steps(2);
+    assert!(asked(&harness, |command| matches!(command, Command::GoTo(4)).then_some(())).is_some());
 }
 
 #[test]
@@ -304,7 +384,7 @@ fn why_names_the_label_that_a_cell_was_given() {
     let cell = labels.iter().position(|label| *label < 14).expect("something was seen");
     let name = crate::colors::class_title(&model.sessions[0].setup.catalog, nudge_core::scene::ClassId(labels[cell]));
     model.picked = Some(Picked::Cell(cell));
-    let harness = harness(why::show, model);
+    let harness = harness(why::State::default(), model);
     assert!(has(&harness, "Floor cell at") && has(&harness, &format!("labelled {name}")));
 }
 

@@ -102,7 +102,11 @@ pub fn view_rows(
             hint: String::new(),
         }
     };
-    order.into_iter().take(LISTED).map(row).collect()
+    // What is compared below is in the list, however far down it stands.
+    let named = decision.pair.iter().copied().chain(looked).map(|view| usize::from(view.0));
+    let named: Vec<usize> = named.filter(|at| order.iter().skip(LISTED).any(|other| other == at)).collect();
+    let below = order.iter().skip(LISTED).copied().filter(|at| named.contains(at));
+    order.iter().take(LISTED).copied().chain(below).map(row).collect()
 }
 
 /// The numbers of the candidates that have a column: title and meaning, in the order in which skills tell them.
@@ -246,6 +250,19 @@ mod tests {
         // With pushes alone the table is as it was.
         decision.candidates.truncate(1);
         assert_eq!(push_columns(&decision).len(), 7);
+    }
+
+    #[test]
+    fn the_second_of_the_pair_is_listed_however_low_it_ranks() {
+        let session = fixture::session(1);
+        let mut decision = session.moments[1].decision().expect("step 1").clone();
+        let order = falling(&decision.gains);
+        let last = ViewId(order[order.len() - 1] as u16);
+        decision.pair = vec![ViewId(order[0] as u16), last];
+        let rows = view_rows(&decision, &session.setup.views, &BTreeSet::new(), None);
+        assert_eq!(rows.iter().filter(|row| row.key == usize::from(last.0)).count(), 1);
+        decision.pair[1] = ViewId(order[1] as u16);
+        assert_eq!(view_rows(&decision, &session.setup.views, &BTreeSet::new(), None).len(), LISTED);
     }
 
     #[test]

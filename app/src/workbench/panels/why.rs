@@ -1,10 +1,12 @@
 //! Why a voxel or a floor cell is believed to be what it is: its numbers, their history, and what changed them.
 
+mod largest;
+
 use super::causes;
 use super::facts::{self, fact};
 use super::maps::picked_cell;
 use super::spark::{self, Spark};
-use super::{NO_EPISODE, empty, heading, legend, words};
+use super::{NO_EPISODE, Panel, empty, heading, legend, words};
 use crate::colors::{self, Colormap};
 use crate::picture;
 use crate::workbench::command::Command;
@@ -24,13 +26,26 @@ use re_viewer::external::egui::{
 const UNKNOWN_SHARE: &str =
     "Vacuity of the Dirichlet, 15 / Σ a for its 15 classes: 1 without evidence, towards 0 with more of it";
 
-/// Draws the numbers, the history and the causes of what was picked.
-pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+/// What the panel remembers.
+#[derive(Default)]
+pub struct State {
+    largest: largest::State,
+}
+
+impl Panel for State {
+    /// Draws the numbers, the history and the causes of what was picked, and the largest changes of the step.
+    fn show(&mut self, ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
+        draw(self, ui, model, ask);
+    }
+}
+
+fn draw(state: &mut State, ui: &mut Ui, model: &Model, ask: &mut Vec<Command>) {
     let Some(session) = model.session() else { return empty(ui, NO_EPISODE) };
     let moment = session.moment(model.cursor);
     let grid = *moment.belief.grid();
     let Some((picked, cell)) = model.picked.and_then(|picked| Some((picked, picked_cell(Some(picked), &grid)?))) else {
-        return empty(ui, "Click a voxel or a floor cell to see why it is believed to be what it is");
+        empty(ui, "Click a voxel or a floor cell to see why it is believed to be what it is");
+        return largest::show(&mut state.largest, ui, model, session, ask);
     };
     let about = About { session, moment, grid, cursor: model.cursor.min(session.steps()), picked, cell };
     egui::ScrollArea::vertical().id_salt("why").auto_shrink(false).show(ui, |ui| {
@@ -54,6 +69,8 @@ pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
                 about.classes(ui);
             });
         });
+        ui.add_space(8.0);
+        largest::show(&mut state.largest, ui, model, session, ask);
     });
 }
 

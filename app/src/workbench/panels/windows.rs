@@ -14,6 +14,7 @@ pub fn show(ctx: &egui::Context, dialog: &mut Dialog) -> Option<Reply> {
     let mut reply = None;
     let modal = egui::Modal::new(egui::Id::new("dialog")).show(ctx, |ui| match dialog {
         Dialog::WriteTo { what, path, part } => reply = write_to(ui, *what, path, part),
+        Dialog::OpenPath { what, path } => reply = open_path(ui, *what, path),
         Dialog::Broke { id, words, path, steps } => reply = broke(ui, *id, words, path, *steps),
         Dialog::Quit { lost } => reply = quit(ui, lost),
         Dialog::Shortcuts => shortcuts(ui),
@@ -69,6 +70,37 @@ fn write_to(ui: &mut egui::Ui, what: MenuCommand, path: &mut String, part: &mut 
             reply = Some(Reply::Write(what, PathBuf::from(path.trim()), *part));
         }
         if ui.button("Do not write").on_hover_text("Nothing is written").clicked() {
+            reply = Some(Reply::Close);
+        }
+    });
+    reply
+}
+
+fn open_path(ui: &mut egui::Ui, what: MenuCommand, path: &mut String) -> Option<Reply> {
+    ui.set_width(520.0);
+    ui.heading(what.title().trim_end_matches('…'));
+    ui.label("No file dialog of the system answered here. Type the path, or drop the file on the window.");
+    ui.add_space(6.0);
+    let typed = ui
+        .horizontal(|ui| {
+            let label = ui.label("Path");
+            let field = egui::TextEdit::singleline(path).desired_width(400.0).hint_text("scenes/high/key-blocker.toml");
+            let field = ui.add(field).labelled_by(label.id).on_hover_text(what.tooltip());
+            if path.is_empty() && !field.has_focus() && !field.lost_focus() {
+                field.request_focus();
+            }
+            field.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter))
+        })
+        .inner;
+    ui.add_space(6.0);
+    let mut reply = None;
+    ui.horizontal(|ui| {
+        let is_there = !path.trim().is_empty();
+        let open = ui.add_enabled(is_there, egui::Button::new("Open")).on_disabled_hover_text("Type a path first");
+        if open.on_hover_text("Opens it").clicked() || (typed && is_there) {
+            reply = Some(Reply::Open(PathBuf::from(path.trim())));
+        }
+        if ui.button("Open nothing").on_hover_text("Goes back to the window").clicked() {
             reply = Some(Reply::Close);
         }
     });

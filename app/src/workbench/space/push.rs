@@ -1,6 +1,6 @@
 //! Pushes in three dimensions: the candidates, and of the one that is looked at what is predicted and what really happened.
 
-use super::voxels::Voxels;
+use super::voxels::{Shown, Voxels};
 use super::{Painter, Side, Space, at, no_arrows};
 use crate::colors;
 use crate::record::shapes;
@@ -10,7 +10,6 @@ use crate::workbench::session::Moment;
 use nudge_core::plan::Action;
 use nudge_core::scene::ClassId;
 use nudge_core::skill::Manipulation;
-use nudge_core::world::TruthMap;
 use std::sync::Arc;
 
 impl Painter {
@@ -69,19 +68,18 @@ impl Painter {
             };
             match beliefs {
                 None => {
-                    self.log_voxels(at::PREDICTED, &grid, Vec::new(), |_| [0; 3]);
-                    self.log_voxels(at::DIFFERENCE, &grid, Vec::new(), |_| [0; 3]);
+                    self.log_voxels(at::PREDICTED, &grid, Shown::nothing());
+                    self.log_voxels(at::DIFFERENCE, &grid, Shown::nothing());
                 }
                 Some((before, after)) => {
                     let truth = side.moment.truth.as_deref();
                     let plain = Display::default();
-                    let (voxels, rgb) =
-                        Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
-                    self.log_voxels(at::PREDICTED, &grid, voxels, rgb);
+                    let shown = Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&plain, None);
+                    self.log_voxels(at::PREDICTED, &grid, shown);
                     let changed = Display { colour_by: ColourBy::Change, band: [0.0, 1.0], ..plain };
-                    let (voxels, rgb) =
+                    let shown =
                         Voxels { belief: &after, truth, catalog: &side.setup.catalog }.drawn(&changed, Some(&before));
-                    self.log_voxels(at::DIFFERENCE, &grid, voxels, rgb);
+                    self.log_voxels(at::DIFFERENCE, &grid, shown);
                 }
             }
         }
@@ -89,13 +87,14 @@ impl Painter {
         let note = if happened.is_some() { "" } else { note(side, looked_at) };
         if self.differs(at::HAPPENED, format!("{:?} {:?} {note}", side.key(), happened.map(|moment| moment.step))) {
             let truth = happened.and_then(|happened| happened.truth.as_deref());
-            let inside = |truth: &TruthMap| truth.occupancy.iter().map(|o| *o == 1).collect::<Vec<bool>>();
-            let voxels = truth.map_or_else(Vec::new, |truth| surface(&grid, &inside(truth)));
+            let inside = truth.map_or_else(Vec::new, |truth| truth.occupancy.iter().map(|o| *o == 1).collect());
             let catalog = &side.setup.catalog;
-            self.log_voxels(at::HAPPENED, &grid, voxels, |index| {
+            let rgb = |index: usize| {
                 let label = truth.and_then(|truth| truth.labels.get(index / grid.dims[2]));
                 label.map_or(colors::UNKNOWN_RGB, |label| colors::of_class(catalog, ClassId(*label)))
-            });
+            };
+            let outside = if truth.is_some() { surface(&grid, &inside) } else { Vec::new() };
+            self.log_voxels(at::HAPPENED, &grid, Shown { outside, inside, rgb: Box::new(rgb) });
             let [_, depth, height] = side.shelf.size;
             self.log(at::HAPPENED_NOTE, &shapes::words([0.0, 0.5 * depth, 0.5 * height], note));
         }

@@ -17,6 +17,23 @@ pub(super) fn voxel_key(display: &Display) -> (ColourBy, [f32; 2], [[f32; 2]; 3]
     (display.colour_by, display.band, display.slice_m)
 }
 
+/// Voxels that shall be seen.
+pub(super) struct Shown<'a> {
+    /// Those that show from outside.
+    pub outside: Vec<usize>,
+    /// Whether a voxel is one of them or within.
+    pub inside: Vec<bool>,
+    /// The colour of one.
+    pub rgb: Box<dyn Fn(usize) -> Rgb + 'a>,
+}
+
+impl Shown<'_> {
+    /// Nothing.
+    pub fn nothing() -> Self {
+        Self { outside: Vec::new(), inside: Vec::new(), rgb: Box::new(|_| [0; 3]) }
+    }
+}
+
 /// A belief with what colours need.
 pub(super) struct Voxels<'a> {
     pub belief: &'a Belief,
@@ -27,7 +44,7 @@ pub(super) struct Voxels<'a> {
 
 impl<'a> Voxels<'a> {
     /// The voxels to draw and their colours. Without a state before, nothing has changed.
-    pub fn drawn(&self, display: &Display, before: Option<&'a Belief>) -> (Vec<usize>, Box<dyn Fn(usize) -> Rgb + 'a>) {
+    pub fn drawn(&self, display: &Display, before: Option<&'a Belief>) -> Shown<'a> {
         let (belief, truth, catalog) = (self.belief, self.truth, self.catalog);
         let grid = &belief.grid;
         let height = grid.dims[2];
@@ -78,6 +95,6 @@ impl<'a> Voxels<'a> {
                 Colormap::Diverging.of(change, [-1.0, 1.0])
             }),
         };
-        (shown, rgb)
+        Shown { outside: shown, inside: voxels, rgb }
     }
 }

@@ -69,9 +69,6 @@ fn link(ctx: &ViewerContext<'_>) {
             Some((property, eye))
         })
         .collect();
-    if eyes.len() < 2 {
-        return;
-    }
     let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
     let moved = eyes.iter().map(|(_, eye)| *eye).find(|eye| Some(*eye) != *last);
     let Some(leader) = moved else { return };
@@ -81,6 +78,12 @@ fn link(ctx: &ViewerContext<'_>) {
         property.save_blueprint_component(ctx, &EyeControls3D::descriptor_look_target(), &leader.target);
         property.save_blueprint_component(ctx, &EyeControls3D::descriptor_eye_up(), &leader.up);
     }
+}
+
+/// Where the eye of all views was in the last frame: its position, what it looks at, and up.
+pub(super) fn last() -> Option<[[f32; 3]; 3]> {
+    let eye = (*LAST.lock().unwrap_or_else(PoisonError::into_inner))?;
+    Some([eye.position.0.0, eye.target.0.0, eye.up.0.0])
 }
 
 fn eye_of(property: &ViewProperty) -> Option<Eye> {

@@ -2,8 +2,8 @@
 
 use super::shapes::{self, REJECTED_RGB};
 use crate::colors::Rgb;
-use nudge_core::arm::{ArmTool, Joints, Motion, Part, Role, pose_of};
 use nudge_core::Pose;
+use nudge_core::arm::{ArmTool, Joints, Motion, Part, Role, pose_of};
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::StepOutcome;
 use nudge_core::plan::Decision;

@@ -48,6 +48,7 @@ impl Decision {
             {
                 format!("{} looks follow a push before the next one", settings.closing_steps)
             }
+            Reason::JustPushed if policy == PolicyKind::MemPick => "a look follows every pick".to_owned(),
             Reason::JustPushed => "nothing is pushed right after a push".to_owned(),
             Reason::Dropped => "an object was dropped, so there are no more pushes".to_owned(),
             Reason::NoCandidate => "no push is feasible".to_owned(),

@@ -37,8 +37,12 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
             if let (Counted::All, true, Some(view)) = (gain.counted(), history.just_pushed(), history.view_of_push) {
                 decision.action = Action::Look { view };
                 decision.reason = Reason::ViewOfPush;
-            } else if let Some(reason) = guarded(&closed_by_last(policy, settings)) {
+            } else if let Some(reason) = guarded(&fewest_closing(policy, settings)) {
                 decision.reason = reason;
+                if let (Some(last), Reason::JustPushed) = (history.last_manipulation(), reason) {
+                    let closed = PlannerSettings { closing_steps: closing_steps(last.kind(), settings), ..*settings };
+                    decision.rule = Some(Rule { policy, settings: closed });
+                }
             } else if still_closing(history, settings) {
                 decision.reason = Reason::JustPushed;
             } else if policy == PolicyKind::ClairvoyantPush {
@@ -82,7 +86,7 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
 }
 
 /// The settings with the fewest closing looks of what the policy may do.
-fn closed_by_last(policy: PolicyKind, settings: &PlannerSettings) -> PlannerSettings {
+fn fewest_closing(policy: PolicyKind, settings: &PlannerSettings) -> PlannerSettings {
     let picks = (policy == PolicyKind::MemPick).then(|| closing_steps(SkillKind::Pick, settings));
     PlannerSettings { closing_steps: picks.unwrap_or(settings.closing_steps).min(settings.closing_steps), ..*settings }
 }

@@ -87,6 +87,7 @@ fn one_look_closes_a_pick_and_more_close_a_push() {
     table.history.record(&picked, false, Some(GripEnd::Stowed));
     let next = table.decide(PolicyKind::MemPick);
     assert_eq!((is_push(&next), next.reason), (false, Reason::JustPushed));
+    assert_eq!(next.comparison().because, "a look follows every pick");
     table.history.record(&next, false, None);
     assert!(is_push(&table.decide(PolicyKind::MemPick)), "after one look");
     let pushed = Decision { action: Action::Manipulate(push().into()), ..picked };

@@ -13,12 +13,13 @@ use crate::made_by::{Build, MadeBy};
 use crate::plan::{self, Action, Decision, History, Situation};
 use crate::rng::stream;
 use crate::scene::{Body, Catalog, ObjectId, Scene};
-use crate::skill::{ArmClearance, Candidate, Counterfactual, Ground, Manipulation};
+use crate::skill::{ArmClearance, Manipulation};
 use crate::world::TruthMap;
 use crate::{Error, Result};
 use std::sync::Arc;
 use std::time::Instant;
 
+mod candidates;
 mod log;
 
 /// A running episode.
@@ -439,29 +440,6 @@ impl Episode {
     /// The catalogue.
     pub fn catalog(&self) -> &Catalog {
         &self.catalog
-    }
-
-    /// The world as it stands, for telling what pushes would really do; `None` where it is not simulated.
-    pub fn counterfactual(&self) -> Option<Counterfactual<'_>> {
-        let world = self.simulated()?.world();
-        Some(Counterfactual::new(world, &self.arm, &self.views, self.estimate.sightings.seen()))
-    }
-
-    /// The candidates that a decision to be made now draws, whatever the policy makes of them.
-    pub fn draw_candidates(&self) -> Vec<Candidate> {
-        let config = &self.record.config;
-        let actions = self.history.actions.len();
-        let (seen, sampler) = (config.planner.counted.left_out(self.seen()), config.planner.push_sampler);
-        let planner = config.policy.settings(&config.planner);
-        let ground = Ground {
-            belief: self.belief(),
-            seen,
-            arm: &self.arm,
-            sampler,
-            place: planner.place,
-            unsealed: &self.history.unsealed,
-        };
-        plan::draw_candidates(&planner, &ground, config.seed, actions)
     }
 
     /// How the belief changes.

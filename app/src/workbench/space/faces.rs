@@ -97,6 +97,8 @@ impl Faces {
                 .with_vertex_normals(self.normals)
                 .with_vertex_colors(self.colors)
                 .with_triangle_indices(self.triangles)
+                // What was empty before was drawn see-through.
+                .with_albedo_factor(rerun::Rgba32::from_unmultiplied_rgba(255, 255, 255, 255))
         })
     }
 }

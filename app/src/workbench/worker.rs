@@ -9,7 +9,7 @@ use super::session::{Activity, Moment, SessionId, Setup};
 use super::threads::Threads;
 use crate::driver::{Driver, update_of};
 use nudge_core::belief::BeliefUpdate;
-use nudge_core::camera::{ViewArray, hidden_objects};
+use nudge_core::camera::hidden_objects;
 use nudge_core::episode::{Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Overwrite, StepOutcome, review};
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::{Catalog, ObjectId, Scene};
@@ -393,7 +393,7 @@ fn opened(
     read_only: Option<String>,
 ) -> Result<Opened> {
     let record = episode.record().clone();
-    let views = ViewArray::named(&record.config.views)?;
+    let views = record.view_array()?;
     let hidden = hidden_objects(&record.scene.shelf, &moments[0].bodies, &views);
     let name = |id: &ObjectId| {
         let object = record.scene.objects.get(usize::from(id.0));

@@ -6,7 +6,7 @@ use super::machine::Episode;
 use super::record::{StepOutcome, StepRecord};
 use crate::arm::{Arm, PhasedMotion};
 use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction};
-use crate::camera::{Intrinsics, MapObservation, NoiseModel, Sensed, View, project};
+use crate::camera::{Intrinsics, MapObservation, NoiseModel, Sensed, View, ViewArray, project};
 use crate::environment::Environment;
 use crate::scene::Catalog;
 use crate::world::{ManipulationOutcome, TruthMap};
@@ -33,8 +33,8 @@ impl BeliefUpdate for Absent {
     }
 }
 
-/// An environment that is no longer there.
-struct Gone;
+/// An environment that is no longer there, with its views if they were its own.
+struct Gone(Option<ViewArray>);
 
 impl Environment for Gone {
     fn frame(&mut self, _: &View, _: &Intrinsics) -> Result<Sensed> {
@@ -50,7 +50,11 @@ impl Environment for Gone {
     }
 
     fn branch(&self) -> Option<Box<dyn Environment>> {
-        Some(Box::new(Self))
+        Some(Box::new(Self(self.0.clone())))
+    }
+
+    fn views(&self) -> Option<&ViewArray> {
+        self.0.as_ref()
     }
 }
 
@@ -65,7 +69,8 @@ pub(super) fn look_through(
     let logged = directory.record()?;
     let update = update.unwrap_or_else(|| Arc::new(Absent(logged.config.belief.clone())));
     let scene = logged.scene.clone();
-    let mut episode = Episode::within(Box::new(Gone), scene, catalog, logged.config.clone(), update)?;
+    let mut episode =
+        Episode::within(Box::new(Gone(logged.recorded_views.clone())), scene, catalog, logged.config.clone(), update)?;
     let has_frames = directory.check_frames(&logged).is_ok();
     for done in 0..=logged.steps.len() {
         let step = done.checked_sub(1).map(|at| &logged.steps[at]);

@@ -59,6 +59,7 @@ impl Episode {
         let scene = scene.with_hand_for(config.policy.picks());
         // Before the scene is given the time to settle.
         check(&scene, &config, &*update)?;
+        ViewArray::named(&config.views)?;
         let environment = Box::new(Simulated::new(&scene, &catalog)?);
         Self::within(environment, scene, catalog, config, update)
     }
@@ -76,15 +77,19 @@ impl Episode {
         update: Arc<dyn BeliefUpdate>,
     ) -> Result<Self> {
         check(&scene, &config, &*update)?;
+        let views = match environment.views() {
+            Some(views) => views.clone(),
+            None => ViewArray::named(&config.views)?,
+        };
         let policy = config.policy;
         if policy.knows_the_future() && environment.simulated().is_none() {
             let message = format!("policy {policy} asks what would really happen, which only a simulated shelf tells");
             return Err(Error::Usage(message));
         }
-        let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         policy.check_hand(&arm.arm)?;
-        let hands = Arc::new(views.hand_poses(&arm));
+        let is_recorded = environment.views().is_some();
+        let hands = Arc::new(if is_recorded { vec![None; views.views.len()] } else { views.hand_poses(&arm) });
         let unreachable = Arc::new(views.unreachable(&hands));
         let estimate = Estimate::uniform(&scene.grid());
         let threads = rayon::current_num_threads();
@@ -95,13 +100,14 @@ impl Episode {
             also_made_by: Vec::new(),
             scene,
             config,
+            recorded_views: is_recorded.then(|| views.clone()),
             prior: Prior::of(&estimate.belief, environment.truth()),
             steps: Vec::new(),
         };
         Ok(Self {
             catalog,
             update,
-            views,
+            views: Arc::new(views),
             hand: arm.ready.map(HandPose::waiting),
             arm,
             hands,
@@ -476,8 +482,7 @@ fn check(scene: &Scene, config: &EpisodeConfig, update: &dyn BeliefUpdate) -> Re
     if config.budget == 0 {
         return Err(Error::Usage("the budget must be at least one action".to_owned()));
     }
-    update.check_grid(&scene.grid())?;
-    ViewArray::named(&config.views).map(drop)
+    update.check_grid(&scene.grid())
 }
 
 /// What an action brought beside its belief.

@@ -14,7 +14,7 @@ use nudge_core::cnabu;
 use nudge_core::environment::Environment;
 use nudge_core::episode::{
     Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Observer, Overwrite, StepOutcome, resume,
-    resume_from_checkpoint,
+    resume_from_checkpoint, resume_within,
 };
 use nudge_core::files::{remove_if_there, temporary_of};
 use nudge_core::plan::{Decision, PolicyKind};
@@ -179,10 +179,33 @@ impl Driver {
         update: Arc<dyn BeliefUpdate>,
         watch: Observer<'_>,
     ) -> Result<Self> {
+        Self::resume_by(out, watch, |observer| resume(out, catalog, update, observer))
+    }
+
+    /// Goes on with an episode whose environment is not simulated and is back; as [`Driver::resume`].
+    ///
+    /// # Errors
+    /// What [`resume_within`] refuses.
+    pub fn resume_within(
+        environment: Box<dyn Environment>,
+        out: &Path,
+        catalog: Arc<Catalog>,
+        update: Arc<dyn BeliefUpdate>,
+        watch: Observer<'_>,
+    ) -> Result<Self> {
+        Self::resume_by(out, watch, |observer| resume_within(out, environment, catalog, update, observer))
+    }
+
+    /// Resumes in one way or another, and records anew what is gone through.
+    fn resume_by(
+        out: &Path,
+        watch: Observer<'_>,
+        resume: impl FnOnce(Observer<'_>) -> Result<(EpisodeDir, Episode)>,
+    ) -> Result<Self> {
         // Beside the old recording, which stays unless the whole log leads where it says.
         let anew = temporary_of(&out.join(RECORDING));
         let mut begun: Option<(Recorder, Story)> = None;
-        let resumed = resume(out, catalog, update, &mut |episode, outcome| {
+        let resumed = resume(&mut |episode, outcome| {
             if let (Some((recorder, story)), Some(outcome)) = (&mut begun, outcome) {
                 recorder.step(episode, outcome)?;
                 story.note(episode);

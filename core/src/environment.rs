@@ -4,9 +4,11 @@
 //! view, has a motion carried out and is told what happened; if the surroundings know the truth, it is scored. Whatever can
 //! do the first two runs every policy but those that know what would happen ([`Environment::simulated`]).
 
+mod external;
 mod recorded;
 mod simulated;
 
+pub use external::{External, PROTOCOL, WorldSettings};
 pub use recorded::Recorded;
 pub use simulated::Simulated;
 

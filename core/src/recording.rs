@@ -13,24 +13,34 @@
 //! | Nerfstudio | `transforms.json` | OpenGL's axes | 1,000 units a metre |
 //! | ROS 2 | a file `.mcap` | `TFMessage` or `PoseStamped` | `Image` or `CompressedImage` |
 
+mod bag;
 mod board;
 mod bop;
+mod cdr;
 mod entry;
 mod find_board;
 mod flying;
 mod folder;
 mod labels;
+mod mcap_file;
 mod nerf;
 mod open;
 mod pixels;
 mod pose_text;
 mod read;
+mod ros;
+mod rvl;
 mod survey;
+mod topics;
+mod transforms;
 mod tum;
 
+pub use bag::{Inspection, TopicLine, inspect};
 pub use board::Board;
 pub use find_board::find_board;
 pub use flying::EDGE_DEG;
+pub(crate) use folder::pinhole as opencv_pinhole;
 pub use labels::LabelMap;
 pub use open::{Recording, Settings};
+pub(crate) use read::frame_of_files;
 pub use survey::{Fate, Row, Survey};

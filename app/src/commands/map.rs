@@ -10,7 +10,7 @@ use nudge_core::environment::Recorded;
 use nudge_core::episode::{EpisodeConfig, Frames, Overwrite, StepRecord};
 use nudge_core::files::write_atomically;
 use nudge_core::plan::{Action, PolicyKind, Reason};
-use nudge_core::recording::{Board, EDGE_DEG, LabelMap, Recording, Settings, Survey, find_board};
+use nudge_core::recording::{Board, EDGE_DEG, LabelMap, Recording, Settings, Survey, find_board, inspect};
 use nudge_core::scene::{Catalog, Scene};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use std::time::Instant;
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// The recording: a folder (depth/, pose/, intrinsics.json; label/ if there are labels), a TUM RGB-D sequence, a BOP scene,
-    /// or a folder with Nerfstudio's transforms.json
+    /// a folder with Nerfstudio's transforms.json, or an MCAP file of ROS 2
     recording: PathBuf,
     /// Where the shelf is in the recording, and how large [default: board.toml in the recording, else a shelf of
     /// 0.8 x 0.4 x 0.4 m at the origin of the recording's frame]
@@ -60,6 +60,12 @@ pub struct Args {
     /// The camera, for recordings that do not tell: an intrinsics.json
     #[arg(long, value_name = "FILE")]
     intrinsics: Option<PathBuf>,
+    /// Which topics of an MCAP file are depth, camera, labels and poses (TOML) [default: what --inspect proposes]
+    #[arg(long, value_name = "FILE")]
+    topics: Option<PathBuf>,
+    /// Print what is in an MCAP file and a topic map to begin with, and map nothing
+    #[arg(long)]
+    inspect: bool,
     /// How beliefs are updated: cnabu (the networks) or classical (counting of rays) [default: cnabu]
     #[arg(long, value_name = "cnabu|classical")]
     belief: Option<String>,
@@ -97,6 +103,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let started = Instant::now();
     args.device.choose()?;
     check(args)?;
+    if args.inspect {
+        return table::inspection(&args.recording, &inspect(&args.recording)?);
+    }
     let catalog = Arc::new(Catalog::standard());
     let recording = Arc::new(Recording::open(&args.recording, settings(args, &catalog)?)?);
     let (board, from) = board(args, &recording)?;
@@ -168,6 +177,7 @@ fn settings(args: &Args, catalog: &Catalog) -> Result<Settings, Error> {
         tolerance_s: args.tolerance,
         every: args.every,
         intrinsics: args.intrinsics.clone(),
+        topics: args.topics.clone(),
     })
 }
 

@@ -4,7 +4,7 @@
 //! Poses are `cam_R_w2c` and `cam_t_w2c` (world to camera, millimetres); a unit of the depth images is `depth_scale`
 //! millimetres. Masks carry the data set's object numbers, which a label map turns into classes.
 
-use super::entry::{Depth, Entry, Labels};
+use super::entry::{Depth, Entry, Labels, Place};
 use super::folder::{from_json, pinhole};
 use super::open::Found;
 use super::pixels::size_of;
@@ -66,7 +66,7 @@ pub(super) fn list(path: &Path) -> Result<Found> {
         entries.push(Entry {
             pose: pose(&raw),
             camera: pinhole(size, [fx, fy], [cx, cy]),
-            depth: place.map(|place| Depth { place, unit_m }).ok_or_else(|| "no depth".to_owned()),
+            depth: place.map(|place| Depth { place: Place::File(place), unit_m }).ok_or_else(|| "no depth".to_owned()),
             labels: if masks.is_empty() { Labels::None } else { Labels::Masks(masks) },
             time_s: None,
             name,

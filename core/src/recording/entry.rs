@@ -1,11 +1,13 @@
 //! One frame as its recording lists it, before an image is read.
 
+use super::mcap_file::Address;
 use crate::Pose;
 use crate::camera::Pinhole;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Nearest and farthest depth that is asked of a recorded camera, metres: what its depth images say counts.
-pub(super) const DEPTH_RANGE_M: [f32; 2] = [0.02, 20.0];
+pub(super) const DEPTH_RANGE_M: [f32; 2] = [0.02, 5.0];
 
 /// One frame of a recording.
 #[derive(Clone, Debug)]
@@ -24,21 +26,40 @@ pub(super) struct Entry {
     pub(super) labels: Labels,
 }
 
+/// Where an image is.
+#[derive(Clone, Debug)]
+pub(super) enum Place {
+    /// A file of its own.
+    File(PathBuf),
+    /// A message of this type.
+    Message { address: Address, kind: Arc<str> },
+}
+
+impl Place {
+    /// The file that holds it.
+    pub(super) fn file(&self) -> &Path {
+        match self {
+            Self::File(file) => file,
+            Self::Message { address, .. } => &address.file,
+        }
+    }
+}
+
 /// Where a depth image is, and what its numbers mean.
 #[derive(Clone, Debug)]
 pub(super) struct Depth {
-    pub(super) place: PathBuf,
+    pub(super) place: Place,
     /// Metres per unit of whole numbers. Real numbers are metres, unless a person says otherwise.
     pub(super) unit_m: f64,
 }
 
 /// Where a frame's labels are.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) enum Labels {
     /// Nowhere.
     None,
     /// A number per pixel.
-    Image(PathBuf),
+    Image(Place),
     /// A mask per object, each with the object's number; the later wins where they overlap.
     Masks(Vec<(PathBuf, u16)>),
 }
@@ -46,6 +67,6 @@ pub(super) enum Labels {
 impl Labels {
     /// A label image that may be there.
     pub(super) fn image_if_there(path: PathBuf) -> Self {
-        if path.is_file() { Self::Image(path) } else { Self::None }
+        if path.is_file() { Self::Image(Place::File(path)) } else { Self::None }
     }
 }

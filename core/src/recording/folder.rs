@@ -7,7 +7,7 @@
 //! `depth_scale` is the number of units of the depth PNGs in a metre. Pixel centres have whole numbers, as OpenCV and ROS
 //! count; `distortion` may give k1, k2, p1, p2, k3. Depth and labels may be NumPy arrays (`.npy`); real numbers are metres.
 
-use super::entry::{DEPTH_RANGE_M, Depth, Entry, Labels};
+use super::entry::{DEPTH_RANGE_M, Depth, Entry, Labels, Place};
 use super::open::{Found, Settings};
 use super::pose_text::pose_of;
 use crate::camera::Pinhole;
@@ -51,7 +51,7 @@ pub(super) fn camera(path: &Path) -> Result<(Pinhole, Option<f64>)> {
 }
 
 /// A camera whose pixel centres have whole numbers, as OpenCV and ROS count; here they are at a half.
-pub(super) fn pinhole([width, height]: [usize; 2], focal_px: [f64; 2], center_px: [f64; 2]) -> Pinhole {
+pub(crate) fn pinhole([width, height]: [usize; 2], focal_px: [f64; 2], center_px: [f64; 2]) -> Pinhole {
     Pinhole {
         width,
         height,
@@ -99,8 +99,10 @@ pub(super) fn list(path: &Path, settings: &Settings) -> Result<Found> {
             Ok(text) => pose_of(&text),
             Err(_) => Err("no pose".to_owned()),
         };
-        let depth = of(&depths, &name).map(|place| Depth { place, unit_m }).ok_or_else(|| "no depth".to_owned());
-        let labels = of(&labels, &name).map_or(Labels::None, Labels::Image);
+        let depth = of(&depths, &name)
+            .map(|place| Depth { place: Place::File(place), unit_m })
+            .ok_or_else(|| "no depth".to_owned());
+        let labels = of(&labels, &name).map_or(Labels::None, |file| Labels::Image(Place::File(file)));
         Entry { name, time_s: None, pose, camera, depth, labels }
     };
     Ok(Found { entries: names.into_iter().map(entry).collect(), warnings })

@@ -4,7 +4,7 @@
 //! Whole numbers are thousandths of a metre unless `depth_unit_scale_factor` says otherwise; real numbers are metres. Pixel
 //! centres are at a half, as Nerfstudio and COLMAP count. Labels, which Nerfstudio does not have, are `label_file_path`.
 
-use super::entry::{DEPTH_RANGE_M, Depth, Entry, Labels};
+use super::entry::{DEPTH_RANGE_M, Depth, Entry, Labels, Place};
 use super::folder::from_json;
 use super::open::Found;
 use super::pose_text::pose_of_rows;
@@ -59,7 +59,7 @@ pub(super) fn list(path: &Path) -> Result<Found> {
         let camera = camera(&raw.camera, &frame.camera)
             .map_err(|(field, words)| Error::input(&file, format!("frames[{at}].{field}"), words))?;
         let depth = match &frame.depth_file_path {
-            Some(depth) if path.join(depth).is_file() => Ok(Depth { place: path.join(depth), unit_m }),
+            Some(depth) if path.join(depth).is_file() => Ok(Depth { place: Place::File(path.join(depth)), unit_m }),
             _ => Err("no depth".to_owned()),
         };
         let stem = Path::new(&frame.file_path).file_stem();

@@ -1,7 +1,7 @@
 //! A recording: which format it has, what is in it, and one frame of it.
 
 use super::entry::Entry;
-use super::{Board, LabelMap, bop, folder, nerf, tum};
+use super::{Board, LabelMap, bag, bop, folder, nerf, tum};
 use crate::camera::{Frame, Pinhole};
 use crate::files::names_in;
 use crate::{Error, Result};
@@ -25,6 +25,8 @@ pub struct Settings {
     pub every: usize,
     /// A file of intrinsics, for recordings that do not tell.
     pub intrinsics: Option<PathBuf>,
+    /// A file that says which topics of an MCAP file are what; `None` where its content tells.
+    pub topics: Option<PathBuf>,
 }
 
 impl Default for Settings {
@@ -36,6 +38,7 @@ impl Default for Settings {
             tolerance_s: 0.02,
             every: 1,
             intrinsics: None,
+            topics: None,
         }
     }
 }
@@ -70,7 +73,10 @@ impl Recording {
             return Err(Error::Usage("--every 0: must be a whole number from 1".to_owned()));
         }
         let has = |name: &str| path.join(name).exists();
-        let (format, found) = if has("transforms.json") {
+        let is_mcap = path.is_file() && path.extension().is_some_and(|end| end.eq_ignore_ascii_case("mcap"));
+        let (format, found) = if is_mcap {
+            ("MCAP", bag::list(path, &settings)?)
+        } else if has("transforms.json") {
             ("Nerfstudio", nerf::list(path)?)
         } else if has("scene_camera.json") {
             ("BOP", bop::list(path)?)
@@ -136,7 +142,7 @@ impl Recording {
 /// Why a path is no recording, in words.
 fn unknown(path: &Path) -> Result<String> {
     if path.is_file() {
-        return Ok("is no recording: a folder is needed".to_owned());
+        return Ok("is no recording: a folder or an .mcap file is needed".to_owned());
     }
     let names = names_in(path)?;
     if names.is_empty() {

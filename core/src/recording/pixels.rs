@@ -1,12 +1,15 @@
 //! Images of one channel: PNGs and NumPy arrays.
 
+use super::entry::Place;
+use super::mcap_file::message;
+use super::ros;
 use crate::wall::guarded;
 use crate::{Error, Result};
 use std::io::Cursor;
 use std::path::Path;
 
 /// Wider or higher images are refused, pixels: the bound of [`Pinhole`](crate::camera::Pinhole).
-const MAX_SIDE: usize = 4096;
+pub(super) const MAX_SIDE: usize = 4096;
 /// More than an image of that size needs, bytes.
 const MAX_BYTES: usize = 192 << 20;
 
@@ -25,11 +28,30 @@ pub(super) enum Values {
 }
 
 impl Pixels {
+    /// Reads an image wherever it is.
+    ///
+    /// # Errors
+    /// Those of [`Pixels::read_file`], and of reading a message.
+    pub(super) fn read(place: &Place) -> Result<Self> {
+        match place {
+            Place::File(path) => Self::read_file(path),
+            Place::Message { address, kind } => {
+                let bytes = message(address)?;
+                let read = guarded(|| ros::pixels(kind, &bytes));
+                read.map_err(|words| Error::input(place.file(), address.topic.to_string(), words))
+            }
+        }
+    }
+
     /// Reads a file, a `.npy` array or a PNG.
     ///
     /// # Errors
     /// One line that names the file: one that is not there, cut short, of colours, or larger than a camera's image.
-    pub(super) fn read(path: &Path) -> Result<Self> {
+    pub(super) fn read_file(path: &Path) -> Result<Self> {
+        let length = std::fs::metadata(path).map_err(|error| Error::io(path, error))?.len();
+        if length > MAX_BYTES as u64 {
+            return Err(Error::input(path, "", format!("has {length} bytes; an image has at most {MAX_BYTES}")));
+        }
         let bytes = std::fs::read(path).map_err(|error| Error::io(path, error))?;
         let is_array = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("npy"));
         let read = guarded(|| if is_array { array(&bytes) } else { png(&bytes) });
@@ -40,7 +62,7 @@ impl Pixels {
 /// Width and height of a PNG or array, without its pixels.
 pub(super) fn size_of(path: &Path) -> Result<[usize; 2]> {
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("npy")) {
-        return Ok(Pixels::read(path)?.size);
+        return Ok(Pixels::read_file(path)?.size);
     }
     let file = std::fs::File::open(path).map_err(|error| Error::io(path, error))?;
     let reader = png::Decoder::new(std::io::BufReader::new(file)).read_info();

@@ -4,7 +4,7 @@
 //! intrinsics in its files: they are read from `intrinsics.json` beside them, else the values that ROS takes for a Kinect
 //! stand in and a warning says so. Labels, which the data set does not have, are `label/` with the depth image's name.
 
-use super::entry::{Depth, Entry, Labels};
+use super::entry::{Depth, Entry, Labels, Place};
 use super::folder::{camera, pinhole};
 use super::open::{Found, Settings};
 use super::pixels::size_of;
@@ -38,7 +38,8 @@ pub(super) fn list(path: &Path, settings: &Settings) -> Result<Found> {
         let file = words.first().map_or("", String::as_str);
         let place = path.join(file);
         let stem = place.file_name().unwrap_or_default().to_owned();
-        let depth = if place.is_file() { Ok(Depth { place, unit_m }) } else { Err("no depth".to_owned()) };
+        let depth =
+            if place.is_file() { Ok(Depth { place: Place::File(place), unit_m }) } else { Err("no depth".to_owned()) };
         Entry {
             name: Path::new(file)
                 .file_stem()

@@ -1,7 +1,7 @@
 //! What `nudge map` prints: which frames are mapped, and what came of it.
 
 use nudge_core::episode::{Episode, NO_TRUTH};
-use nudge_core::recording::{Board, Fate, Recording, Survey};
+use nudge_core::recording::{Board, Fate, Inspection, Recording, Survey};
 use nudge_core::scene::{BACKGROUND, ClassId};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -69,6 +69,20 @@ pub(super) fn frames(recording: &Recording, survey: &Survey, board: &Board, from
     text += "\n";
     if survey.labelled() == 0 {
         text += "no labels: only occupancy is mapped, and the semantic map stays as unsure as it was\n";
+    }
+    super::super::print(&text)
+}
+
+/// What is in an MCAP file, and which of it to map.
+pub(super) fn inspection(path: &Path, found: &Inspection) -> anyhow::Result<()> {
+    let mut text = String::new();
+    for line in &found.topics {
+        let encoding = if line.encoding.is_empty() { String::new() } else { format!("  ({})", line.encoding) };
+        text += &format!("# {:<46} {:>6}  {}{encoding}\n", line.topic, line.count, line.kind);
+    }
+    match &found.proposal {
+        Ok(proposal) => text += &format!("\n{proposal}"),
+        Err(words) => super::super::warn(&format!("{}: {words}", path.display())),
     }
     super::super::print(&text)
 }

@@ -48,7 +48,15 @@ impl TryFrom<Filed> for ViewArray {
         if filed.views.is_empty() || filed.views.len() > usize::from(u16::MAX) {
             return Err(format!("{} views; 1 to {} are allowed", filed.views.len(), u16::MAX));
         }
+        let layout = filed.layout;
+        let is_small = layout.iter().all(|n| (1..=usize::from(u16::MAX)).contains(n));
+        if !is_small || layout.iter().product::<usize>() > usize::from(u16::MAX) {
+            return Err(format!("layout {layout:?}: at most {} views have a place", u16::MAX));
+        }
         let view = |(at, view): (usize, FiledView)| {
+            if view.slot.iter().zip(layout).any(|(slot, size)| usize::from(*slot) >= size) {
+                return Err(format!("view {at}: slot {:?} is outside layout {layout:?}", view.slot));
+            }
             let is_near = |x: &f32| x.is_finite() && x.abs() <= 1000.0;
             if !view.position.iter().chain(&view.target).all(is_near) {
                 return Err(format!("view {at} is nowhere"));

@@ -77,10 +77,8 @@ impl Episode {
         update: Arc<dyn BeliefUpdate>,
     ) -> Result<Self> {
         check(&scene, &config, &*update)?;
-        let views = match environment.views() {
-            Some(views) => views.clone(),
-            None => ViewArray::named(&config.views)?,
-        };
+        let own = environment.views().cloned();
+        let views = own.clone().map_or_else(|| ViewArray::named(&config.views), Ok)?;
         let policy = config.policy;
         if policy.knows_the_future() && environment.simulated().is_none() {
             let message = format!("policy {policy} asks what would really happen, which only a simulated shelf tells");
@@ -88,8 +86,7 @@ impl Episode {
         }
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         policy.check_hand(&arm.arm)?;
-        let is_recorded = environment.views().is_some();
-        let hands = Arc::new(if is_recorded { vec![None; views.views.len()] } else { views.hand_poses(&arm) });
+        let hands = Arc::new(if own.is_some() { vec![None; views.views.len()] } else { views.hand_poses(&arm) });
         let unreachable = Arc::new(views.unreachable(&hands));
         let estimate = Estimate::uniform(&scene.grid());
         let threads = rayon::current_num_threads();
@@ -100,7 +97,7 @@ impl Episode {
             also_made_by: Vec::new(),
             scene,
             config,
-            recorded_views: is_recorded.then(|| views.clone()),
+            recorded_views: own,
             prior: Prior::of(&estimate.belief, environment.truth()),
             steps: Vec::new(),
         };

@@ -8,5 +8,7 @@ mod formats;
 mod mcaps;
 #[path = "map/real.rs"]
 mod real;
+#[path = "map/world.rs"]
+mod world;
 #[path = "map/written.rs"]
 mod written;

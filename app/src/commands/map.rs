@@ -9,7 +9,7 @@ use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::environment::Recorded;
 use nudge_core::episode::{EpisodeConfig, Frames, Overwrite, StepRecord};
 use nudge_core::files::write_atomically;
-use nudge_core::plan::{Action, PolicyKind, Reason};
+use nudge_core::plan::{Action, Decision, PolicyKind, Reason};
 use nudge_core::recording::{Board, EDGE_DEG, LabelMap, Recording, Settings, Survey, find_board, inspect};
 use nudge_core::scene::{Catalog, Scene};
 use std::path::{Path, PathBuf};
@@ -119,6 +119,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         robot: Default::default(),
     };
     scene.check_numbers(args.board.as_deref().unwrap_or(&args.recording))?;
+    let began = Instant::now();
     let survey = recording.survey(&board)?;
     if !args.json {
         table::frames(&recording, &survey, &board, &from)?;
@@ -140,13 +141,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         progress.at(step.index);
     }
     progress.finish();
+    let mapping_s = began.elapsed().as_secs_f64();
     let record = driver.episode().record().clone();
     let labelled = survey.labelled();
     let episode = driver.finish()?;
     if args.json {
         super::print(&record.to_json())?;
     } else {
-        table::summary(&episode, labelled, &out, started.elapsed().as_secs_f64());
+        table::summary(&episode, labelled, &out, [started.elapsed().as_secs_f64(), mapping_s]);
     }
     Ok(())
 }
@@ -238,11 +240,11 @@ fn begin(args: &Args, scene: Scene, catalog: Arc<Catalog>, recorded: Recorded, o
 
 /// Maps the next frame.
 fn next(args: &Args, driver: &mut Driver) -> Result<StepRecord, Error> {
-    let mut decision = driver.decide();
-    if args.policy.is_none() {
-        let done = driver.episode().record().steps.len();
-        decision.action = Action::Look { view: ViewId(done as u16) };
-        decision.reason = Reason::Manual;
-    }
+    // What comes next in the recording's own order, nobody weighed.
+    let in_order = || {
+        let view = ViewId(driver.episode().record().steps.len() as u16);
+        Decision::unweighed(Action::Look { view }, Reason::Manual)
+    };
+    let decision = if args.policy.is_some() { driver.decide() } else { in_order() };
     Ok(driver.act(decision)?.record)
 }

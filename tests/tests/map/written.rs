@@ -96,3 +96,39 @@ fn write_frames(episode: &Path, out: &Path) {
     camera["frames"] = frames.into();
     std::fs::write(out.join("frames.json"), camera.to_string()).expect("written");
 }
+
+/// The numbers that a long recording is to be mapped with. To be run alone, on the machine that they are about.
+#[test]
+#[ignore = "takes minutes; prints frames a second and memory"]
+fn a_hundred_frames_map_at_eight_a_second_in_a_gigabyte() {
+    let Some(python) = venv_tool("python") else { return };
+    let folder = Folder::new();
+    let (episode, frames) = (folder.path("episode"), folder.path("frames"));
+    let scene = argument(&root().join("scenes/high/box-wall.toml"));
+    let run = ["run", &scene, "--policy", "random", "--noise", "standard", "--budget", "100", "--out"];
+    nudge_ok(&[&run[..], &[&argument(&episode)]].concat());
+    std::fs::create_dir(&frames).expect("created");
+    write_frames(&episode, &frames);
+    let script = root().join("tests/python/write_recordings.py");
+    let written = Command::new(python).arg(script).arg(&frames).arg(folder.path("")).output().expect("python");
+    assert!(written.status.success(), "{}", String::from_utf8_lossy(&written.stderr));
+    let (recording, out) = (folder.name("png"), folder.name("mapped"));
+    let mut child = Command::new(nudge_tests::program_bin())
+        .args(["map", &recording, "--out", &out])
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("nudge starts");
+    let mut peak_kb = 0_u64;
+    while child.try_wait().expect("waits").is_none() {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kb = line.and_then(|line| line.trim().trim_end_matches(" kB").parse().ok());
+        peak_kb = peak_kb.max(kb.unwrap_or(0));
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    let said = String::from_utf8(child.wait_with_output().expect("ends").stdout).expect("text");
+    let rate = said.lines().find_map(|line| line.trim().strip_suffix(" frames a second")).expect("a rate");
+    let rate: f64 = rate.rsplit(' ').next().and_then(|number| number.parse().ok()).expect("a number");
+    eprintln!("{rate} frames a second, {} MB\n{said}", peak_kb / 1024);
+    assert!(rate >= 8.0 && peak_kb <= 1 << 20, "{rate} frames a second, {peak_kb} kB");
+}

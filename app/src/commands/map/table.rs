@@ -88,7 +88,7 @@ pub(super) fn inspection(path: &Path, found: &Inspection) -> anyhow::Result<()> 
 }
 
 /// What came of it.
-pub(super) fn summary(episode: &Episode, labelled: usize, out: &Path, seconds: f64) {
+pub(super) fn summary(episode: &Episode, labelled: usize, out: &Path, [seconds, mapping_s]: [f64; 2]) {
     let record = episode.record();
     let (first, last) = (record.prior.entropy_nats, record.entropy_after(record.steps.len()));
     println!();
@@ -97,8 +97,15 @@ pub(super) fn summary(episode: &Episode, labelled: usize, out: &Path, seconds: f
     let classes = if labelled > 0 { believed(episode) } else { "no labels, so none".to_owned() };
     println!("  {:<20} {classes}", "believed classes");
     println!("  {:<20} {NO_TRUTH}", "scores");
-    let mapping: f64 = record.steps.iter().map(|step| step.seconds.total()).sum();
-    println!("  {:<20} {seconds:.1} s, {:.1} frames a second", "time", record.steps.len() as f64 / mapping.max(1e-9));
+    println!("  {:<20} {seconds:.1} s, {:.1} frames a second", "time", record.steps.len() as f64 / mapping_s.max(1e-9));
+    let parts = record
+        .steps
+        .iter()
+        .map(|step| step.seconds)
+        .fold([0.0; 4], |sum, s| [sum[0] + s.decide, sum[1] + s.act, sum[2] + s.update, sum[3] + s.record]);
+    for (name, seconds) in ["decide", "read", "update", "record"].into_iter().zip(parts) {
+        println!("  {:<20} {seconds:.1}", format!("  {name}"));
+    }
     println!("  {:<20} {}", "written to", out.display());
 }
 

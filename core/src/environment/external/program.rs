@@ -6,6 +6,7 @@ use crate::{Error, Result};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// An answer is not longer than this, bytes; images are files.
@@ -17,7 +18,8 @@ const GRACE: Duration = Duration::from_secs(2);
 pub(super) struct Program {
     child: Child,
     input: Option<ChildStdin>,
-    answers: Receiver<std::result::Result<String, String>>,
+    /// Locked by nobody else: an environment may be looked at from several threads.
+    answers: Mutex<Receiver<std::result::Result<String, String>>>,
     timeout: Duration,
     next: u64,
     /// What ended the conversation.
@@ -52,7 +54,7 @@ impl Program {
             }
         });
         let timeout = Duration::from_secs_f64(settings.timeout_s);
-        Ok(Self { child, input, answers, timeout, next: 0, ended: None })
+        Ok(Self { child, input, answers: Mutex::new(answers), timeout, next: 0, ended: None })
     }
 
     /// Asks and waits for the answer. After an error every further call is one.
@@ -60,7 +62,8 @@ impl Program {
         if let Some(why) = &self.ended {
             return Err(Error::Usage(format!("the world is gone: it {why}")));
         }
-        if let Ok(heard) = self.answers.try_recv() {
+        let early = self.answers.get_mut().unwrap_or_else(PoisonError::into_inner).try_recv();
+        if let Ok(heard) = early {
             let line = heard.unwrap_or_default();
             return Err(self.fail(&format!("spoke without being asked, or answered twice: {}", shortened(&line))));
         }
@@ -74,7 +77,7 @@ impl Program {
             let why = self.how_it_ended(what);
             return Err(self.fail(&why));
         }
-        let line = match self.answers.recv_timeout(self.timeout) {
+        let line = match self.answers.get_mut().unwrap_or_else(PoisonError::into_inner).recv_timeout(self.timeout) {
             Ok(Ok(line)) => line,
             Ok(Err(words)) => return Err(self.fail(&words)),
             Err(RecvTimeoutError::Timeout) => {

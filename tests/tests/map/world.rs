@@ -1,14 +1,11 @@
 //! Worlds of other programs: an episode in one, and what becomes of it when the program misbehaves.
 
-#[path = "map/written.rs"]
-mod written;
-
+use super::written::{FRAMES, Written, beliefs};
 use nudge_core::belief::Belief;
 use nudge_core::episode::EpisodeDir;
 use nudge_core::plan::Action;
 use nudge_tests::{nudge_fails, nudge_ok, root, venv_tool};
 use std::path::Path;
-use written::{FRAMES, Written, beliefs};
 
 fn same(a: &[Belief], b: &[Belief]) -> bool {
     a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.occupancy == b.occupancy && a.semantics == b.semantics)

@@ -8,6 +8,7 @@ mod charts;
 mod markdown;
 mod page;
 mod palette;
+mod picks;
 mod results;
 mod scenes;
 mod table;

@@ -177,6 +177,12 @@ impl Window {
         (self.x[0]..self.x[1]).flat_map(move |x| (self.y[0]..self.y[1]).map(move |y| x * depth + y))
     }
 
+    /// The smallest window that holds both.
+    pub fn hull(&self, other: &Self) -> Self {
+        let hull = |a: [usize; 2], b: [usize; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        Self { x: hull(self.x, other.x), y: hull(self.y, other.y) }
+    }
+
     /// The window grown by `cells` on every side, clipped to the grid.
     pub fn grown(self, cells: usize, grid: &Grid) -> Self {
         let grow = |range: [usize; 2], limit: usize| [range[0].saturating_sub(cells), (range[1] + cells).min(limit)];

@@ -4,6 +4,7 @@
 //! semantic map and `gamma` is [`GAMMA`] unless a user says otherwise ([`SETTINGS`]). A [`Decision`] keeps everything that was
 //! weighed, and by what: whoever shows it prints its [`Comparison`] and its [ranked candidates](Decision::ranked_candidates).
 
+mod ahead;
 mod because;
 mod comparison;
 mod counted;
@@ -31,6 +32,7 @@ use crate::belief::{Belief, BeliefUpdate};
 use crate::camera::{ViewArray, ViewId};
 use crate::grid::VoxelSet;
 use crate::skill::{Ground, Manipulation, PushTruth, Rejection};
+use crate::world::GripEnd;
 use serde::{Deserialize, Serialize};
 
 /// What the robot does at one step. In files `kind` is `look` or the name of a skill.
@@ -118,13 +120,21 @@ pub struct CandidateRecord {
     /// How long the arm's motion takes, in, along and back, seconds; `None` if rejected.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion_s: Option<f64>,
+    /// What it makes way for, where that is what it is worth: half of what both open together.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub then: Option<Manipulation>,
 }
 
 impl CandidateRecord {
     /// A manipulation that was neither weighed nor rejected.
     pub fn of(manipulation: impl Into<Manipulation>) -> Self {
         let manipulation = manipulation.into();
-        Self { manipulation, rejection: None, gain: None, view: None, reg: None, motion_s: None }
+        Self { manipulation, rejection: None, gain: None, view: None, reg: None, motion_s: None, then: None }
+    }
+
+    /// What it makes way for, in words, where that is what it is worth.
+    pub fn makes_way_for(&self) -> Option<String> {
+        self.then.map(|then| format!("a {} {}", then.kind().name(), then.skill().describe().short))
     }
 
     /// What stood against it, in words; `None` for a feasible candidate.
@@ -178,6 +188,8 @@ pub struct History {
     pub best_gains: Vec<f32>,
     /// Whether an object was dropped.
     pub dropped: bool,
+    /// Where a cup touched and did not seal, metres: it is not tried there again.
+    pub unsealed: Vec<[f32; 3]>,
 }
 
 impl Decision {
@@ -205,13 +217,16 @@ impl Decision {
 }
 
 impl History {
-    /// Records that `decision.action` was done, and whether it dropped an object.
+    /// Records that `decision.action` was done, whether it dropped an object, and how holding one ended.
     ///
     /// A look uses its view up; a push clears the used views and, unless it dropped something, keeps the view for which
     /// it was chosen for the next step.
-    pub fn record(&mut self, decision: &Decision, dropped: bool) {
+    pub fn record(&mut self, decision: &Decision, dropped: bool, grip: Option<GripEnd>) {
         self.actions.push(decision.action);
         self.dropped |= dropped;
+        if let (Action::Manipulate(Manipulation::Pick(pick)), Some(GripEnd::NoSeal)) = (decision.action, grip) {
+            self.unsealed.push(pick.contact);
+        }
         self.view_of_push = None;
         match decision.action {
             Action::Look { view } => {
@@ -231,6 +246,14 @@ impl History {
     /// Looks since the last push; `None` before the first one.
     pub fn looks_since_push(&self) -> Option<usize> {
         self.actions.iter().rev().position(|action| matches!(action, Action::Manipulate(_)))
+    }
+
+    /// The last action that was no look.
+    pub fn last_manipulation(&self) -> Option<&Manipulation> {
+        self.actions.iter().rev().find_map(|action| match action {
+            Action::Manipulate(manipulation) => Some(manipulation),
+            Action::Look { .. } => None,
+        })
     }
 
     /// Whether the last action was a push.
@@ -268,8 +291,14 @@ pub struct Situation<'a> {
 impl Situation<'_> {
     /// What candidates are drawn from.
     fn ground(&self, settings: &PlannerSettings) -> Ground<'_> {
-        let seen = settings.counted.left_out(self.seen);
-        Ground { belief: self.belief, seen, arm: self.arm, sampler: settings.push_sampler, place: settings.place }
+        Ground {
+            belief: self.belief,
+            seen: settings.counted.left_out(self.seen),
+            arm: self.arm,
+            sampler: settings.push_sampler,
+            place: settings.place,
+            unsealed: &self.history.unsealed,
+        }
     }
 
     /// The views that are offered, by id.

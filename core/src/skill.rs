@@ -65,6 +65,8 @@ pub struct Ground<'a> {
     pub sampler: PushSampler,
     /// Where what is picked is set down.
     pub place: PickPlace,
+    /// Where a cup touched and did not seal, metres.
+    pub unsealed: &'a [[f32; 3]],
 }
 
 /// One thing that the arm can do. The type that implements it is what there is to choose about one such manipulation.

@@ -7,7 +7,7 @@ mod physics;
 mod truth;
 
 pub use manipulate::{Grip, GripEnd, LinkContact};
-pub use physics::{BEND_NM, PULL_N, STROKE_M};
+pub use physics::{BEND_NM, LIP_M, PULL_N, STROKE_M};
 pub use truth::TruthMap;
 
 use crate::arm::Joints;
@@ -92,6 +92,15 @@ pub struct ManipulationOutcome {
     pub arm_s: f32,
     /// The configurations that the arm passed until it turned back.
     pub passed: Vec<Joints>,
+}
+
+impl ManipulationOutcome {
+    /// Sum of the displacements, metres, without that of an object that was held until it was where it was to be.
+    pub fn disturbed_m(&self) -> f64 {
+        let carried = self.grip.as_ref().filter(|grip| grip.end.is_held()).and_then(|grip| grip.object);
+        let others = (0u16..).zip(&self.displacement_m).filter(|(at, _)| carried != Some(ObjectId(*at)));
+        others.map(|(_, m)| f64::from(*m)).sum()
+    }
 }
 
 impl World {

@@ -90,3 +90,26 @@ fn a_policy_that_picks_with_a_hand_without_a_cup_is_refused_in_one_line() {
     let line = nudge_fails(2, &[&run[..], &["no-such-arm.urdf"]].concat());
     assert!(line.contains("no-such-arm.urdf"), "{line}");
 }
+
+#[test]
+fn a_report_tells_how_picks_ended_and_counts_each_as_two_actions() {
+    let folder = tempfile::tempdir().expect("tempdir");
+    let (scene, out) = (folder.path().join("tins.toml"), folder.path().join("b"));
+    std::fs::write(&scene, SCENE).expect("written");
+    let bench = ["bench", text(&scene), "--belief", "classical", "--budget", "6", "--seeds", "1", "--place", "tray"];
+    let said = nudge_ok(&[&bench[..], &["--policies", "greedy-front-pick,mem-no-push", "--out", text(&out)]].concat());
+    assert!(said.lines().any(|line| line.ends_with("pushes   picks")), "{said}");
+    let report = nudge_ok(&["report", "--markdown", text(&out)]);
+    let row = |after: &str| -> Vec<String> {
+        let table = report.split(after).nth(1).unwrap_or_else(|| panic!("no {after} in {report}"));
+        let row = table.lines().find(|line| line.contains("greedy-front-pick")).expect("a row");
+        row.split('|').map(|cell| cell.trim().to_owned()).filter(|cell| !cell.is_empty()).collect()
+    };
+    let ends = row("Picks.");
+    assert_eq!(ends[1], "1.0", "{ends:?}");
+    assert!(ends[2].starts_with("100 %") && ends[3].starts_with("0 %"), "{ends:?}");
+    // The pick is the 5th of six actions: counted twice, the 6th no longer fits, and the map is that of before the last look.
+    let (once, twice) = (row("Maps:"), row("counts as two actions"));
+    assert_eq!(twice.len(), 5, "{twice:?}");
+    assert_ne!(once[2].split(' ').next(), Some(&*twice[2]), "{once:?} {twice:?}");
+}

@@ -4,6 +4,8 @@ use super::plan::{EpisodeId, Plan};
 use nudge_core::episode::{EpisodeRecord, NO_TRUTH, StepRecord, StepSeconds};
 use nudge_core::plan::{Action, PolicyKind, Reason};
 use nudge_core::score::{ObjectVerdict, Scores, Tally, Verdict};
+use nudge_core::skill::SkillKind;
+use nudge_core::world::GripEnd;
 use nudge_core::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -67,8 +69,11 @@ pub struct StepResult {
     pub verdicts: VerdictCounts,
     /// Objects that the step dropped.
     pub dropped: Vec<String>,
-    /// Sum of object displacements, metres.
+    /// Sum of object displacements, metres, without those of objects that were held until they were set down.
     pub displacement_m: f64,
+    /// How a pick ended.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grip: Option<GripEnd>,
 }
 
 /// How many objects have which verdict.
@@ -166,9 +171,35 @@ impl EpisodeResult {
         (0..=self.steps.len()).map(|actions| score(self.scores(actions))).collect()
     }
 
-    /// Number of pushes.
+    /// Number of pushes: of manipulations that hold nothing.
     pub fn pushes(&self) -> usize {
-        self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).count()
+        let moved = self.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).count();
+        moved - self.picks()
+    }
+
+    /// Number of picks.
+    pub fn picks(&self) -> usize {
+        self.steps.iter().filter(|step| step.is_pick()).count()
+    }
+
+    /// Number of picks that ended in some way.
+    pub fn picks_ended(&self, is: fn(GripEnd) -> bool) -> usize {
+        self.steps.iter().filter(|step| step.grip.is_some_and(is)).count()
+    }
+
+    /// Number of picks that dropped something.
+    pub fn picks_that_dropped(&self) -> usize {
+        self.steps.iter().filter(|step| step.is_pick() && !step.dropped.is_empty()).count()
+    }
+
+    /// Number of steps that fit in a number of actions where a pick counts as two.
+    pub fn steps_within(&self, actions: usize) -> usize {
+        let mut cost = 0;
+        let fits = self.steps.iter().take_while(|step| {
+            cost += if step.is_pick() { 2 } else { 1 };
+            cost <= actions
+        });
+        fits.count()
     }
 
     /// Number of pushes that dropped something.
@@ -189,6 +220,10 @@ impl EpisodeResult {
 }
 
 impl StepResult {
+    fn is_pick(&self) -> bool {
+        matches!(self.action, Action::Manipulate(manipulation) if manipulation.kind() == SkillKind::Pick)
+    }
+
     fn new(step: &StepRecord) -> Option<Self> {
         let judgement = step.judgement.as_ref()?;
         let gain = match step.action {
@@ -206,6 +241,7 @@ impl StepResult {
             verdicts: VerdictCounts::of(&judgement.objects),
             dropped: judgement.dropped.clone(),
             displacement_m: judgement.displacement_m,
+            grip: step.grip(),
         })
     }
 }

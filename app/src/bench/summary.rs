@@ -24,6 +24,8 @@ pub struct SummaryRow {
     pub revealed: Option<f64>,
     /// Pushes in an episode.
     pub pushes: f64,
+    /// Picks in an episode.
+    pub picks: f64,
 }
 
 /// Sums results up by set and policy, in the order in which they first appear.
@@ -52,5 +54,6 @@ fn row(set: &str, policy: PolicyKind, group: &[&EpisodeResult]) -> SummaryRow {
         entropy_nats: of(&|result| result.scores(result.steps.len()).entropy_nats),
         revealed: (hidden > 0).then(|| revealed as f64 / hidden as f64),
         pushes: of(&|result| result.pushes() as f64),
+        picks: of(&|result| result.picks() as f64),
     }
 }

@@ -240,15 +240,31 @@ fn available_memory() -> Option<u64> {
 }
 
 fn table(rows: &[SummaryRow]) -> String {
+    let picks = rows.iter().any(|row| row.picks > 0.0);
     let mut text = format!(
-        "\n{:<12} {:<20} {:>8}  {:>6}  {:>6}  {:>8}  {:>8}  {:>6}\n",
-        "set", "policy", "episodes", "IoU", "mIoU", "H nats", "revealed", "pushes"
+        "\n{:<12} {:<20} {:>8}  {:>6}  {:>6}  {:>8}  {:>8}  {:>6}{}\n",
+        "set",
+        "policy",
+        "episodes",
+        "IoU",
+        "mIoU",
+        "H nats",
+        "revealed",
+        "pushes",
+        if picks { "   picks" } else { "" }
     );
     for row in rows {
         let revealed = row.revealed.map_or("-".to_owned(), |share| format!("{:.0} %", 100.0 * share));
         text += &format!(
-            "{:<12} {:<20} {:>8}  {:>6.3}  {:>6.3}  {:>8.0}  {revealed:>8}  {:>6.1}\n",
-            row.set, row.policy, row.episodes, row.occupancy_iou, row.semantic_miou, row.entropy_nats, row.pushes
+            "{:<12} {:<20} {:>8}  {:>6.3}  {:>6.3}  {:>8.0}  {revealed:>8}  {:>6.1}{}\n",
+            row.set,
+            row.policy,
+            row.episodes,
+            row.occupancy_iou,
+            row.semantic_miou,
+            row.entropy_nats,
+            row.pushes,
+            if picks { format!("  {:>6.1}", row.picks) } else { String::new() }
         );
     }
     text

@@ -258,6 +258,11 @@ fn manipulations(page: &mut String, decision: &Decision, kind: SkillKind) {
         );
     }
     page.push('\n');
+    let listed = feasible.iter().take(LISTED);
+    for (at, then) in listed.filter_map(|(at, c)| Some((at, c.makes_way_for()?))) {
+        let _ = writeln!(page, "- {name} {at} makes way for {then}: its gain is half of what both open together");
+    }
+    page.push('\n');
 }
 
 /// The commonest reasons why candidates were rejected.

@@ -3,7 +3,7 @@
 use super::results::Results;
 use super::table::plain;
 use super::words::{self, Paragraph};
-use super::{scenes, tables};
+use super::{picks, scenes, tables};
 use nudge_core::Result;
 use nudge_core::scene::Catalog;
 
@@ -35,6 +35,8 @@ pub fn markdown(results: &Results) -> Result<String> {
             Some(tables::scores(results, set)),
             tables::differences(results, set),
             Some(tables::actions(results, set)),
+            picks::ends(results, set),
+            picks::counted_twice(results, set),
             Some(tables::verdicts(results, set)),
         ];
         text += &of_set.into_iter().flatten().map(|table| table.markdown()).collect::<String>();

@@ -3,7 +3,7 @@
 use super::charts::{self, Figure, SIZE};
 use super::results::Results;
 use super::words::{self, Paragraph, count};
-use super::{scenes, tables};
+use super::{picks, scenes, tables};
 use crate::bench::SetPlan;
 use crate::figure::{PIXELS_PER_UNIT, escape};
 use crate::picture;
@@ -55,6 +55,8 @@ impl Page {
             body += &tables::scores(results, set).html();
             body += &tables::differences(results, set).map_or(String::new(), |table| table.html());
             body += &tables::actions(results, set).html();
+            body += &picks::ends(results, set).map_or(String::new(), |table| table.html());
+            body += &picks::counted_twice(results, set).map_or(String::new(), |table| table.html());
             body += &tables::verdicts(results, set).html();
             body += &scenes::extremes(results, set, &catalog, bench_from_page)?;
         }

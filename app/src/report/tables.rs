@@ -63,7 +63,7 @@ pub fn scores(results: &Results, set: usize) -> Table {
 /// What the robot did for it.
 pub fn actions(results: &Results, set: usize) -> Table {
     let mut table = Table::new(
-        "Actions. A drop is a push after which an object lay off the board; “revealed” are the objects unseen from every \
+        "Actions. A drop is a push or pick after which an object lay off the board; “revealed” are the objects unseen from every \
          view at the start and found at the end.",
         &["policy", "episodes", "pushes per episode", "drops", "displacement per episode", "decision", "revealed"],
     );
@@ -76,7 +76,7 @@ pub fn actions(results: &Results, set: usize) -> Table {
             Cell::named(policy),
             Cell::new(cell.episodes().count()),
             Cell::new(format!("{:.1}", cell.mean(|result| result.pushes() as f64))),
-            share(drops, pushes, "pushes"),
+            share(drops, pushes + sum(EpisodeResult::picks), "moves"),
             Cell::new(format!("{:.2} m", cell.mean(EpisodeResult::displacement_m))),
             Cell::new(seconds.map_or("-".to_owned(), |seconds| format!("{seconds:.2} s"))),
             share(revealed, hidden, "objects"),

@@ -94,7 +94,7 @@ impl Episode {
         let mut history = History::default();
         let mut hand = self.arm().ready.map(HandPose::waiting);
         for step in &logged.steps {
-            history.record(&step.decision, !step.dropped().is_empty());
+            history.record(&step.decision, !step.dropped().is_empty(), step.grip());
             let to = match step.action {
                 Action::Look { view } => self.hand_poses().get(usize::from(view.0)).cloned().flatten(),
                 Action::Manipulate(_) => self.arm().ready.map(HandPose::waiting),

@@ -16,9 +16,11 @@ use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::skill::{ArmClearance, Candidate, Counterfactual, Ground, Manipulation};
 use crate::world::TruthMap;
 use crate::{Error, Result};
+use check::check;
 use std::sync::Arc;
 use std::time::Instant;
 
+mod check;
 mod log;
 
 /// A running episode.
@@ -260,7 +262,7 @@ impl Episode {
         self.filed_truth = None;
         let happened = Happened {
             dropped: outcome.dropped.clone(),
-            displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
+            displacement_m: outcome.disturbed_m(),
             motion_s: to_wait.duration_s() + f64::from(outcome.arm_s),
             push: Some(PushReport::of(&outcome, |id| self.name(id))),
         };
@@ -330,7 +332,8 @@ impl Episode {
         updating: Instant,
         mut seconds: StepSeconds,
     ) -> StepRecord {
-        self.history.record(&decision, !happened.dropped.is_empty());
+        let grip = happened.push.as_ref().and_then(|push| push.grip.as_ref()).map(|grip| grip.end);
+        self.history.record(&decision, !happened.dropped.is_empty(), grip);
         let judge = |truth: &TruthMap| {
             let dropped = happened.dropped.iter().map(|id| self.name(*id)).collect();
             Judgement::of(&self.estimate.belief, truth, &self.catalog, dropped, happened.displacement_m)
@@ -455,7 +458,14 @@ impl Episode {
         let actions = self.history.actions.len();
         let (seen, sampler) = (config.planner.counted.left_out(self.seen()), config.planner.push_sampler);
         let planner = config.policy.settings(&config.planner);
-        let ground = Ground { belief: self.belief(), seen, arm: &self.arm, sampler, place: planner.place };
+        let ground = Ground {
+            belief: self.belief(),
+            seen,
+            arm: &self.arm,
+            sampler,
+            place: planner.place,
+            unsealed: &self.history.unsealed,
+        };
         plan::draw_candidates(&planner, &ground, config.seed, actions)
     }
 
@@ -468,18 +478,6 @@ impl Episode {
     pub fn history(&self) -> &History {
         &self.history
     }
-}
-
-/// Whether an episode can be begun.
-fn check(scene: &Scene, config: &EpisodeConfig, update: &dyn BeliefUpdate) -> Result<()> {
-    if config.belief != update.name() {
-        let message = format!("the episode is about belief `{}`, not `{}`", config.belief, update.name());
-        return Err(Error::Usage(message));
-    }
-    if config.budget == 0 {
-        return Err(Error::Usage("the budget must be at least one action".to_owned()));
-    }
-    update.check_grid(&scene.grid())
 }
 
 /// What an action brought beside its belief.

@@ -109,6 +109,11 @@ impl StepRecord {
         self.judgement.as_ref().map_or(&[], |judgement| &judgement.dropped)
     }
 
+    /// How holding an object ended, after a pick.
+    pub fn grip(&self) -> Option<GripEnd> {
+        self.push.as_ref().and_then(|push| push.grip.as_ref()).map(|grip| grip.end)
+    }
+
     /// Sum of object displacements, metres, where it is known.
     pub fn displacement_m(&self) -> Option<f64> {
         self.judgement.as_ref().map(|judgement| judgement.displacement_m)

@@ -1,12 +1,12 @@
 //! From a situation to the next action.
 
-use super::rule::{PUSH_EVERY, look_or_push, push_guard, saturated, still_closing};
+use super::rule::{PUSH_EVERY, closing_steps, look_or_push, push_guard, saturated, still_closing};
 use super::weigh::{Weighed, front_most, random_push, weigh_clairvoyantly, weigh_pushes};
 use super::{Action, Counted, Decision, Gain, PlannerSettings, PolicyKind, Reason, Rule, Situation};
 use crate::belief::Belief;
 use crate::camera::ViewId;
 use crate::rng::stream;
-use crate::skill::{PushTruth, SkillKind};
+use crate::skill::{PushTruth, SkillKind, SkillSet};
 use rand::Rng;
 use rayon::prelude::*;
 
@@ -30,13 +30,14 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         ..Decision::unweighed(Action::Look { view: best_look }, Reason::Schedule)
     };
     let complete = || situation.belief.certain_share(settings.certain) >= settings.complete;
-    let guard = || push_guard(history, situation.budget, complete(), settings);
+    let guarded = |settings: &PlannerSettings| push_guard(history, situation.budget, complete(), settings);
+    let guard = || guarded(settings);
     match policy {
         PolicyKind::Mem | PolicyKind::MemPick | PolicyKind::ClairvoyantPush => {
             if let (Counted::All, true, Some(view)) = (gain.counted(), history.just_pushed(), history.view_of_push) {
                 decision.action = Action::Look { view };
                 decision.reason = Reason::ViewOfPush;
-            } else if let Some(reason) = guard() {
+            } else if let Some(reason) = guarded(&closed_by_last(policy, settings)) {
                 decision.reason = reason;
             } else if still_closing(history, settings) {
                 decision.reason = Reason::JustPushed;
@@ -44,6 +45,9 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
                 let (weighed, truth) = weigh_clairvoyantly(settings, situation, &gain);
                 choose_clairvoyantly(&mut decision, weighed, truth.as_ref(), settings, situation.belief);
             } else {
+                // Towards the end there may be looks enough left for a pick, and not for a push.
+                let skills = guard().map_or(settings.skills, |_| SkillSet::of(&[SkillKind::Pick]));
+                let settings = &PlannerSettings { skills, ..*settings };
                 let weighed = weigh_pushes(settings, situation, &gain);
                 choose(&mut decision, weighed, settings);
             }
@@ -75,6 +79,12 @@ pub fn decide(policy: PolicyKind, settings: &PlannerSettings, situation: &Situat
         PolicyKind::Oracle => decision.action = clairvoyant_look(situation),
     }
     decision
+}
+
+/// The settings with the fewest closing looks of what the policy may do.
+fn closed_by_last(policy: PolicyKind, settings: &PlannerSettings) -> PlannerSettings {
+    let picks = (policy == PolicyKind::MemPick).then(|| closing_steps(SkillKind::Pick, settings));
+    PlannerSettings { closing_steps: picks.unwrap_or(settings.closing_steps).min(settings.closing_steps), ..*settings }
 }
 
 /// Applies the rule to what was weighed. What is held goes where it is set down, so a pick keeps what it promises and has to

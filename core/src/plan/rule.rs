@@ -1,6 +1,7 @@
 //! The rule and its guards, as functions of plain numbers.
 
 use super::{History, PlannerSettings, Reason};
+use crate::skill::SkillKind;
 
 /// The scheduled policies push at every step whose number, counted from 1, is a multiple of this.
 pub const PUSH_EVERY: usize = 5;
@@ -33,7 +34,14 @@ pub fn push_guard(history: &History, budget: usize, map_complete: bool, settings
 /// Whether the last push still needs looks: fewer than [`PlannerSettings::closing_steps`] followed it, so the map does
 /// not yet show what it moved and what it opened.
 pub fn still_closing(history: &History, settings: &PlannerSettings) -> bool {
-    history.looks_since_push().is_some_and(|looks| looks < settings.closing_steps)
+    let closing = history.last_manipulation().map_or(0, |last| closing_steps(last.kind(), settings));
+    history.looks_since_push().is_some_and(|looks| looks < closing)
+}
+
+/// Looks that close a manipulation: [`PlannerSettings::closing_steps`] after a push; one after a pick, whose outcome the cup
+/// tells, so that nothing but what it opens has to be looked at.
+pub fn closing_steps(kind: SkillKind, settings: &PlannerSettings) -> usize {
+    if kind == SkillKind::Pick { 1 } else { settings.closing_steps }
 }
 
 /// Whether looking no longer gets better or worse: two consecutive best gains differ by less than `share` of the larger

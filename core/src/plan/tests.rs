@@ -13,6 +13,7 @@ use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 mod clairvoyant;
 mod kept;
 mod mem;
+mod picks;
 mod policies;
 
 const BUDGET: usize = 20;
@@ -193,7 +194,7 @@ impl Table {
         (0..count)
             .map(|_| {
                 let decision = self.decide(policy);
-                self.history.record(&decision, false);
+                self.history.record(&decision, false, None);
                 decision
             })
             .collect()

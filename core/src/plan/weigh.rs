@@ -1,5 +1,6 @@
 //! The worth of pushes: IGM and Reg of every candidate.
 
+use super::ahead::weigh_ahead;
 use super::worth::Worth;
 use super::{CandidateRecord, Gain, PlannerSettings, Situation};
 use crate::arm::PhasedMotion;
@@ -69,11 +70,17 @@ pub(super) fn weigh_pushes(settings: &PlannerSettings, situation: &Situation<'_>
     let offered = situation.offered();
     let worth = Worth::new(gain, views, &offered);
     let predictions = update.predict(belief, &interventions);
-    let mut best: Option<(usize, &Prediction)> = None;
-    for ((prediction, (view, gain)), &at) in predictions.iter().zip(worth.of_each(&predictions)).zip(&feasible) {
+    let predicted: Vec<(usize, &Prediction)> = feasible.into_iter().zip(&predictions).collect();
+    for (&(at, prediction), (view, gain)) in predicted.iter().zip(worth.of_each(&predictions)) {
         candidates[at].gain = Some(gain);
         candidates[at].view = view;
         candidates[at].reg = Some(disturbance(belief, prediction));
+    }
+    let is_pick = |(at, _): &(usize, &Prediction)| candidates[*at].manipulation.kind() == SkillKind::Pick;
+    let picks: Vec<(usize, &Prediction)> = predicted.iter().copied().filter(is_pick).collect();
+    weigh_ahead(settings, situation, &worth, &mut candidates, &picks);
+    let mut best: Option<(usize, &Prediction)> = None;
+    for &(at, prediction) in &predicted {
         if best.is_none_or(|(best, _)| candidates[at].gain > candidates[best].gain) {
             best = Some((at, prediction));
         }
@@ -109,8 +116,8 @@ pub(super) fn weigh_clairvoyantly(
 /// Draws one feasible manipulation at random, pushes from the frontier as in the paper, with those that were rejected on the
 /// way.
 pub(super) fn random_push(situation: &Situation<'_>, settings: &PlannerSettings) -> Weighed {
-    let (belief, arm, actions) = (situation.belief, situation.arm, situation.history.actions.len());
-    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier, place: settings.place };
+    let actions = situation.history.actions.len();
+    let ground = Ground { seen: None, sampler: PushSampler::Frontier, ..situation.ground(settings) };
     let drawn = random_candidate(settings.skills, &ground, situation.seed, actions);
     let candidates: Vec<CandidateRecord> = drawn.iter().map(|drawn| record_of(drawn, situation)).collect();
     let best = candidates.iter().position(|candidate| candidate.rejection.is_none());

@@ -124,7 +124,7 @@ impl<'a> Counterfactual<'a> {
             won: Vec::new(),
             lost: Vec::new(),
             opened: VoxelSet::empty(&self.grid),
-            displacement_m: outcome.displacement_m.iter().map(|m| f64::from(*m)).sum(),
+            displacement_m: outcome.disturbed_m(),
             pushed_m: outcome.way_m,
             jammed: outcome.stalled,
             dropped: outcome.dropped,

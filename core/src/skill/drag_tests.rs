@@ -37,7 +37,8 @@ fn arm() -> ArmTool {
 }
 
 fn drawn(belief: &Belief, arm: &ArmTool) -> Vec<Candidate> {
-    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier, place: PickPlace::Shelf };
+    let ground =
+        Ground { belief, seen: None, arm, sampler: PushSampler::Frontier, place: PickPlace::Shelf, unsealed: &[] };
     SkillKind::Drag.sample(&ground, 6, &mut stream(1, "drags", 0))
 }
 

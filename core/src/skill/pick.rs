@@ -11,7 +11,7 @@ mod room;
 
 use super::sampling::draw_until;
 use super::{
-    ArmClearance, Arrow, CONFIDENT, Candidate, Description, Fact, Ground, Manipulation, Outline, Parameter, Rejection,
+    ArmClearance, Arrow, Candidate, Description, Fact, Ground, LIKELY, Manipulation, Outline, Parameter, Rejection,
     Skill, Stage, Unit,
 };
 use crate::arm::{Arm, ArmTool, Joints, PhaseKind, PhasedMotion, level_tool};
@@ -115,7 +115,7 @@ impl Skill for Pick {
     fn sample(ground: &Ground<'_>, count: usize, rng: &mut ChaCha8Rng) -> Vec<Candidate> {
         let Some(cup) = ground.arm.arm.cup else { return Vec::new() };
         let clearance = ArmClearance::new(ground.arm, ground.belief);
-        let shelf = fronts::Shelf::new(ground.belief, ground.seen);
+        let shelf = fronts::Shelf::new(ground);
         let offers = fronts::offers(&shelf, cup.radius_m as f32, ground.place);
         let mut offered = offers.into_iter();
         draw_until(
@@ -168,7 +168,7 @@ impl Skill for Pick {
     fn intervention(&self, belief: &Belief, _solid: &FloorPlan, swept: VoxelSet) -> Intervention {
         let (grid, stroke) = (&belief.grid, self.stroke());
         let nothing = |swept| Intervention { swept, flow: Flow::nothing(), stroke, held: Some(0.0) };
-        let Some(target) = self.target(&FloorPlan::new(belief, CONFIDENT), grid) else { return nothing(swept) };
+        let Some(target) = self.target(&FloorPlan::new(belief, LIKELY), grid) else { return nothing(swept) };
         let away = || Flow::away(grid, &target);
         let (flow, held) = match (self.end, self.place) {
             (Some(GripEnd::NoSeal), _) => return nothing(swept),

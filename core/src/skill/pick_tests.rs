@@ -68,7 +68,7 @@ fn settled(bodies: Vec<Body>) -> World {
 }
 
 fn picks(belief: &Belief, arm: &ArmTool, place: PickPlace) -> Vec<Candidate> {
-    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier, place };
+    let ground = Ground { belief, seen: None, arm, sampler: PushSampler::Frontier, place, unsealed: &[] };
     Pick::sample(&ground, 80, &mut stream(0, "picks", 0))
 }
 
@@ -132,6 +132,34 @@ fn with_a_tray_the_object_is_gone_for_good_and_no_drop() {
     let standing = after.standing();
     assert!(standing[0].stowed && !standing[0].dropped && !standing[1].stowed);
     assert_eq!(after.bodies_at(&standing).expect("the same bodies").len(), 1);
+}
+
+#[test]
+fn the_cup_seals_on_cans_wherever_their_fronts_are_between_voxels() {
+    let arm = arm();
+    for i in 0u8..5 {
+        let y = 0.15 + 0.001 * f32::from(i);
+        for size in [[0.07, 0.0, 0.099], [0.075, 0.0, 0.24], [0.06, 0.05, 0.12]] {
+            let world = settled(vec![body(0, size, 0.0, y, 0.0, 0.3)]);
+            let (_, motion) = pick_at(&picks(&knowing(&world.bodies()), &arm, PickPlace::Tray), 0.0);
+            let outcome = world.clone().execute(&arm.arm, &motion);
+            assert_eq!(outcome.grip.map(|grip| grip.end), Some(GripEnd::Stowed), "{size:?} at y = {y}");
+        }
+    }
+}
+
+#[test]
+fn what_is_held_is_not_torn_off_when_the_arm_turns_aside() {
+    let arm = arm();
+    for x in [-0.28, -0.1, 0.12, 0.28] {
+        for size in [[0.07, 0.0, 0.099], [0.158, 0.062, 0.207]] {
+            let world = settled(vec![body(0, size, x, 0.12, 0.0, 0.41)]);
+            let belief = knowing(&world.bodies());
+            let (_, motion) = pick_at(&picks(&belief, &arm, PickPlace::Tray), x);
+            let outcome = world.clone().execute(&arm.arm, &motion);
+            assert_eq!(outcome.grip.map(|grip| grip.end), Some(GripEnd::Stowed), "{size:?} at x = {x}");
+        }
+    }
 }
 
 #[test]

@@ -38,6 +38,13 @@ pub enum GripEnd {
     Stowed,
 }
 
+impl GripEnd {
+    /// Whether the object was held until it was where it was to be.
+    pub fn is_held(self) -> bool {
+        matches!(self, Self::SetDown | Self::Stowed)
+    }
+}
+
 /// How a motion ended.
 struct Ride {
     /// The last configuration.
@@ -94,7 +101,7 @@ impl World {
             }
         }
         self.physics.let_go();
-        let is_done = !stalled && grip.is_none_or(|grip| matches!(grip.end, GripEnd::SetDown | GripEnd::Stowed));
+        let is_done = !stalled && grip.is_none_or(|grip| grip.end.is_held());
         back.push(last);
         let passed = back.clone();
         back.reverse();

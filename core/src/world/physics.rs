@@ -5,7 +5,7 @@
 
 mod suction;
 
-pub use suction::{BEND_NM, PULL_N, STROKE_M};
+pub use suction::{BEND_NM, LIP_M, PULL_N, STROKE_M};
 
 use super::hull::Hull;
 use super::shelf_panels;
@@ -45,6 +45,8 @@ const ANGULAR_DAMPING: f32 = 1.0;
 const SHELF: Group = Group::GROUP_1;
 const OBJECT: Group = Group::GROUP_2;
 const TOOL: Group = Group::GROUP_3;
+/// What the cup holds, beside [`OBJECT`].
+const HELD: Group = Group::GROUP_4;
 
 /// A rigid body of the arm.
 #[derive(Clone)]

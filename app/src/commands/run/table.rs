@@ -6,6 +6,7 @@ use nudge_core::camera::NoiseModel;
 use nudge_core::episode::{EpisodeRecord, NO_TRUTH, StepRecord};
 use nudge_core::plan::{Action, Reason};
 use nudge_core::score::{Scores, Verdict};
+use nudge_core::world::GripEnd;
 
 pub(super) fn header(record: &EpisodeRecord) {
     let config = &record.config;
@@ -72,9 +73,15 @@ pub(super) fn summary(columns: &[Column]) {
         line("", columns, |column| column.record.config.policy.to_string());
     }
     line("looks, pushes", columns, |column| {
-        let pushes = pushes(&column.record);
-        format!("{}, {pushes}", column.record.steps.len() - pushes)
+        let (pushes, picks) = (pushes(&column.record), picks(&column.record));
+        format!("{}, {pushes}", column.record.steps.len() - pushes - picks)
     });
+    if columns.iter().any(|column| picks(&column.record) > 0) {
+        line("picks, held", columns, |column| {
+            let held = column.record.steps.iter().filter(|step| step.grip().is_some_and(GripEnd::is_held)).count();
+            format!("{}, {held}", picks(&column.record))
+        });
+    }
     line("occupancy IoU", columns, |column| {
         scored(column, |s| format!("{:.3} (occupied {:.3})", s.occupancy_iou, s.occupied_iou))
     });
@@ -139,7 +146,11 @@ fn hidden_found(column: &Column) -> usize {
 }
 
 fn pushes(record: &EpisodeRecord) -> usize {
-    record.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).count()
+    record.steps.iter().filter(|step| matches!(step.action, Action::Manipulate(_))).count() - picks(record)
+}
+
+fn picks(record: &EpisodeRecord) -> usize {
+    record.steps.iter().filter(|step| step.grip().is_some()).count()
 }
 
 fn total(column: &Column, part: impl Fn(&StepRecord) -> f64) -> f64 {

@@ -248,6 +248,10 @@ impl Here<'_> {
             fact("best view", view, "The view with the largest gain under the predicted belief"),
         ];
         let told = candidate.manipulation.describe();
+        facts.extend(candidate.makes_way_for().map(|then| {
+            let hint = "It opens less itself: the gain is half of what both open together";
+            fact("makes way for", then.replace('-', "−"), hint)
+        }));
         facts.extend(told.facts.into_iter().map(|told| fact(told.name, told.text.replace('-', "−"), told.hint)));
         facts::show(ui, "push numbers", 2, &facts);
         if let Some(rejection) = &candidate.rejection {

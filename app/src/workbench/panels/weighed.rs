@@ -170,6 +170,7 @@ pub fn push_rows(decision: &Decision, listed: Listed, selected: Option<usize>) -
             Some(rejection) => ("rejected".to_owned(), words::capital(&candidate.manipulation.against(rejection))),
             None => (String::new(), String::new()),
         };
+        let hint = candidate.makes_way_for().map_or(hint, |then| format!("Makes way for {}", then.replace('-', "−")));
         let place = told
             .facts
             .first()

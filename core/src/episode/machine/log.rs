@@ -13,7 +13,7 @@ use std::sync::Arc;
 impl Episode {
     /// Adds a step of a log with the estimate after it.
     pub(in crate::episode) fn take_note(&mut self, step: &StepRecord, estimate: Estimate) {
-        self.history.record(&step.decision, !step.dropped().is_empty());
+        self.history.record(&step.decision, !step.dropped().is_empty(), step.grip());
         let to = match step.action {
             Action::Look { view } => self.hands.get(usize::from(view.0)).cloned().flatten(),
             Action::Manipulate(_) => self.arm.ready.map(HandPose::waiting),

@@ -7,7 +7,7 @@ fn a_history_takes_down_what_was_done() {
     let table = Table::new();
     let look = table.decide(PolicyKind::MemNoPush);
     let mut history = History::default();
-    history.record(&look, false);
+    history.record(&look, false, None);
     assert_eq!((history.actions.len(), history.used_views.len()), (1, 1));
     assert_eq!(history.best_gains, [look.best_gain().expect("a gain")]);
 
@@ -18,16 +18,16 @@ fn a_history_takes_down_what_was_done() {
         best_push: Some(0),
         ..look.clone()
     };
-    history.record(&pushed, false);
+    history.record(&pushed, false, None);
     assert!(history.just_pushed() && history.used_views.is_empty());
     assert_eq!((history.view_of_push, history.best_gains.len()), (Some(ViewId(3)), 1));
     // A push by hand is not the one that was weighed; after a drop there is nothing to look at.
     let by_hand = Push { length_m: 0.07, ..push() };
-    history.record(&Decision { action: Action::Manipulate(by_hand.into()), ..pushed.clone() }, false);
+    history.record(&Decision { action: Action::Manipulate(by_hand.into()), ..pushed.clone() }, false, None);
     assert_eq!((history.view_of_push, history.dropped), (None, false));
-    history.record(&pushed, true);
+    history.record(&pushed, true, None);
     assert_eq!((history.view_of_push, history.dropped), (None, true));
-    history.record(&look, false);
+    history.record(&look, false, None);
     assert!(history.dropped, "a drop is for ever");
 }
 

@@ -16,7 +16,7 @@ fn mem_looks_from_the_best_view_and_reports_all_gains() {
     assert!(first.igv > gains[best] && first.pair.len() == 2);
 
     // Used up, it is still reported, but not chosen.
-    table.history.record(&first, false);
+    table.history.record(&first, false, None);
     let second = table.decide(PolicyKind::Mem);
     assert_eq!(second.gains, first.gains);
     assert!(!second.pair.contains(&ViewId(best as u16)));
@@ -70,7 +70,7 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
     }
 
     table.history.used_views = vec![worth];
-    table.history.record(&decision, false);
+    table.history.record(&decision, false, None);
     assert!(table.history.used_views.is_empty(), "a push clears the used views");
     let next = table.decide(PolicyKind::Mem);
     assert_eq!((next.action, next.reason), (Action::Look { view: worth }, Reason::ViewOfPush));
@@ -80,7 +80,7 @@ fn after_a_push_mem_takes_the_view_that_made_it_worth_it() {
     table.settings = settings.counting(Counted::Unseen);
     assert_eq!(table.decide(PolicyKind::Mem).reason, Reason::JustPushed);
     table.settings = settings;
-    table.history.record(&next, false);
+    table.history.record(&next, false, None);
     assert_eq!(table.history.view_of_push, None);
     assert_ne!(table.decide(PolicyKind::Mem).reason, Reason::ViewOfPush);
 }

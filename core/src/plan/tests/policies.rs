@@ -73,6 +73,6 @@ fn the_oracle_takes_the_view_that_really_tells_most() {
     let mut table = Table::new();
     let first = table.decide(PolicyKind::Oracle);
     assert_eq!((first.action, first.reason), (Action::Look { view: ViewId(9) }, Reason::Schedule));
-    table.history.record(&first, false);
+    table.history.record(&first, false, None);
     assert_eq!(table.decide(PolicyKind::Oracle).action, Action::Look { view: ViewId(11) });
 }

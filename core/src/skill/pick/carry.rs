@@ -9,34 +9,67 @@ use crate::belief::Patch;
 use crate::rng::ChaCha8Rng;
 use crate::skill::clearance::{Approach, ArmClearance, QUERY};
 use crate::skill::{Rejection, Stage};
-use nalgebra::Vector3;
+use crate::world::{LIP_M, STROKE_M};
+use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
 pub use super::room::LIFT_M;
 
-/// How far the cup is pressed on beyond where the belief has the front, metres: half of what the bellows gives way.
-pub const PRESS_M: f32 = 0.004;
+/// How far the cup is pressed on beyond the middle of the front, metres: midway between where its lip just meets it and where
+/// the bellows gives way no farther.
+pub const PRESS_M: f32 = 0.5 * (STROKE_M - LIP_M);
 /// How far above the board an object is let go, metres: what is lowered farther would be pressed on the board.
 pub const GAP_M: f32 = 0.001;
 /// How far the cup goes along its own axis at the end of its way in, metres.
 const ALONG_AXIS_M: f64 = 0.03;
 /// How far before the front edge the back of an object must come to be out of the shelf, metres.
-const OUT_M: f64 = 0.02;
+const OUT_M: f64 = 0.05;
 /// How finely a turn of the whole arm is checked, radians.
 const TURN_STEP_RAD: f64 = 0.05;
+
+/// Turns of the hand about the cup's axis that are tried, degrees.
+const TURNS_DEG: [f64; 4] = [0.0, 180.0, 90.0, -90.0];
+
+/// A pose turned about its own axis ahead.
+fn turned(pose: &Frame, turn_deg: f64) -> Frame {
+    let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_deg.to_radians());
+    Frame::from_parts(pose.translation, pose.rotation * turn)
+}
 
 /// A pick being planned.
 struct Carrying<'a> {
     clearance: &'a ArmClearance<'a>,
     space: Space<'a>,
     target: &'a Patch,
-    /// The way of the object in hand.
-    path: Vec<Joints>,
+    /// Where the arm is.
+    at: Joints,
+    /// The way of the object in hand: the arm comes to rest at every corner, so that nothing is torn off the cup.
+    way: Motion,
 }
 
 /// The arm's motion for a pick of an object, or why there is none.
+///
+/// A cup is round, so the hand may be turned about it: of the turns that fail, the first gives the reason.
 pub(super) fn motion(
     pick: &Pick,
+    clearance: &ArmClearance<'_>,
+    target: &Patch,
+    rng: &mut ChaCha8Rng,
+) -> Result<PhasedMotion, Rejection> {
+    let mut against = Rejection::NoWay;
+    for (number, turn_deg) in TURNS_DEG.into_iter().enumerate() {
+        match motion_turned(pick, turn_deg, clearance, target, rng) {
+            Ok(motion) => return Ok(motion),
+            Err(rejection) if number == 0 => against = rejection,
+            Err(_) => (),
+        }
+    }
+    Err(against)
+}
+
+fn motion_turned(
+    pick: &Pick,
+    turn_deg: f64,
     clearance: &ArmClearance<'_>,
     target: &Patch,
     rng: &mut ChaCha8Rng,
@@ -48,7 +81,7 @@ pub(super) fn motion(
         return Err(Rejection::NoCup);
     }
     let press = (pick.touch() + pick.ahead() * PRESS_M).map(f64::from);
-    let touch = level_tool(&press, pick.yaw_rad());
+    let touch = turned(&level_tool(&press, pick.yaw_rad()), turn_deg);
     let up = f64::from(LIFT_M);
     let approach = Approach {
         poses: &[touch],
@@ -60,7 +93,8 @@ pub(super) fn motion(
     let reached = clearance.motion(&approach, rng)?;
     let way_in = reached.phases.into_iter().find(|phase| phase.kind == PhaseKind::Approach).ok_or(Rejection::NoWay)?;
     let start = way_in.motion.path().next_back().ok_or(Rejection::NoWay)?;
-    let mut carrying = Carrying { clearance, space: clearance.space().pushing(), target, path: vec![start] };
+    let space = clearance.space().pushing();
+    let mut carrying = Carrying { clearance, space, target, at: start, way: Motion::default() };
     // Out until the object's back is before the front edge.
     let grid = clearance.grid();
     let back = target.cells().iter().map(|cell| cell % grid.dims[1]).max().unwrap_or(0);
@@ -74,13 +108,14 @@ pub(super) fn motion(
             carrying.go(Vector3::new(dx, 0.0, 0.0))?;
             carrying.go(Vector3::new(0.0, out + dy, 0.0))?;
             carrying.go(Vector3::new(0.0, 0.0, -(up - f64::from(GAP_M))))?;
-            phases.push(Phase::closed(PhaseKind::Carry, Motion::along(arm, &carrying.path, CARRY_M_S)));
-            phases.push(Phase::closed(PhaseKind::Retreat, carrying.back(&ready, out + dy, rng)?));
+            let back = carrying.back(&ready, out + dy, rng)?;
+            phases.push(Phase::closed(PhaseKind::Carry, carrying.way));
+            phases.push(Phase::closed(PhaseKind::Retreat, back));
         }
         None => {
             let turned = carrying.aside()?;
-            carrying.path.push(turned);
-            phases.push(Phase::closed(PhaseKind::Carry, Motion::along(arm, &carrying.path, CARRY_M_S)));
+            carrying.moved(&[carrying.at, turned]);
+            phases.push(Phase::closed(PhaseKind::Carry, carrying.way));
             let there = Motion::along(arm, &[turned, turned], CARRY_M_S);
             phases.push(Phase::closed(PhaseKind::Stow, there));
             let free = clearance.space();
@@ -93,19 +128,22 @@ pub(super) fn motion(
 }
 
 impl Carrying<'_> {
-    fn last(&self) -> Joints {
-        self.path[self.path.len() - 1]
+    /// Moves along a path and comes to rest.
+    fn moved(&mut self, path: &[Joints]) {
+        let motion = Motion::along(&self.clearance.tool().arm, path, CARRY_M_S);
+        self.way = std::mem::take(&mut self.way).then(&motion);
+        self.at = path.last().copied().unwrap_or(self.at);
     }
 
     /// Moves the object straight on.
     fn go(&mut self, travel: Vector3<f64>) -> Result<(), Rejection> {
         let arm = &self.clearance.tool().arm;
-        let pose = arm.world_from_tool(&self.last());
+        let pose = arm.world_from_tool(&self.at);
         if let (_, Some(hit)) = self.clearance.gripper_hit(&pose, &travel, Some(self.target)) {
             return Err(Rejection::ArmBlocked { stage: OUT, hit });
         }
         let mut met = None;
-        let Follow { path, complete } = follow_line(arm, &self.last(), &travel, |joints| {
+        let Follow { path, complete } = follow_line(arm, &self.at, &travel, |joints| {
             met = self.space.hit(joints);
             met.is_none()
         });
@@ -114,16 +152,19 @@ impl Carrying<'_> {
                 met.map_or(Rejection::Unreachable { stage: OUT }, |hit| Rejection::ArmBlocked { stage: OUT, hit })
             );
         }
-        self.path.extend(path.into_iter().skip(1));
+        self.moved(&path);
         Ok(())
     }
 
     /// Turns the whole arm by a quarter about its first joint, to the side that is free: beside the robot.
     fn aside(&self) -> Result<Joints, Rejection> {
         let arm = &self.clearance.tool().arm;
-        let from = self.last();
+        let from = self.at;
         let mut met = Rejection::Unreachable { stage: OUT };
-        for quarter in [-FRAC_PI_2, FRAC_PI_2] {
+        // First to the side where it is already: on the other one it would come past the whole shelf.
+        let side =
+            if arm.world_from_tool(&from).translation.x < arm.world_from_base.translation.x { 1.0 } else { -1.0 };
+        for quarter in [side * FRAC_PI_2, -side * FRAC_PI_2] {
             let steps = (FRAC_PI_2 / TURN_STEP_RAD).ceil() as usize;
             let turned = |step: usize| {
                 let mut joints = from;
@@ -145,7 +186,7 @@ impl Carrying<'_> {
     /// Back to where the arm waits, from where it let go: along the cup's own axis, then straight out.
     fn back(&self, ready: &Joints, out: f64, rng: &mut ChaCha8Rng) -> Result<Motion, Rejection> {
         let arm = &self.clearance.tool().arm;
-        let start = self.last();
+        let start = self.at;
         let pose: Frame = arm.world_from_tool(&start);
         let drawn = pose.rotation * Vector3::new(0.0, 0.0, -ALONG_AXIS_M);
         let mut chain = vec![start];

@@ -5,13 +5,15 @@ use super::{Pick, PickPlace};
 use crate::Point;
 use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch};
 use crate::grid::{Cell, Voxel, VoxelSet};
-use crate::skill::{AVOIDED, LIKELY, Rejection};
+use crate::skill::{AVOIDED, Ground, LIKELY, Rejection};
 use crate::world::STROKE_M;
 
 /// Heights of the cup's middle above the board, metres.
 const HEIGHTS_M: [f32; 2] = [0.03, 0.12];
 /// Heights that are tried, from the middle of the object on, metres.
 const TRIED_M: [f32; 5] = [0.0, 0.02, -0.02, 0.04, -0.04];
+/// How far from where it did not seal a cup is tried again, in radii.
+const TRIED_APART: f32 = 0.75;
 /// Largest tangent of the angle between a front and the entrance's plane: 30 degrees.
 const STEEPEST: f32 = 0.577;
 /// Occupancy probability above which nothing is set down in a voxel.
@@ -35,12 +37,15 @@ pub(super) struct Offer {
 pub(super) struct Shelf<'a> {
     belief: &'a Belief,
     seen: Option<&'a VoxelSet>,
+    /// Where a cup touched and did not seal.
+    unsealed: &'a [[f32; 3]],
     plan: FloorPlan,
 }
 
 impl<'a> Shelf<'a> {
-    pub(super) fn new(belief: &'a Belief, seen: Option<&'a VoxelSet>) -> Self {
-        Self { belief, seen, plan: FloorPlan::new(belief, AVOIDED) }
+    pub(super) fn new(ground: &Ground<'a>) -> Self {
+        let Ground { belief, seen, unsealed, .. } = *ground;
+        Self { belief, seen, unsealed, plan: FloorPlan::new(belief, AVOIDED) }
     }
 
     /// The objects that stand first behind the entrance somewhere, from left to right.
@@ -100,19 +105,21 @@ impl<'a> Shelf<'a> {
                 rows.push((i as f32, self.front(target, column, level)? as f32));
             }
         }
-        let count = rows.len() as f32;
-        let mean = rows.iter().map(|(_, row)| row).sum::<f32>() / count;
-        let slope =
-            rows.iter().map(|(i, row)| i * (row - mean)).sum::<f32>() / rows.iter().map(|(i, _)| i * i).sum::<f32>();
+        let Front { mean, slope, bulge } = Front::fit(&rows);
         let off = |(i, row): &(f32, f32)| row - mean - slope * i;
         let (least, most) = rows.iter().map(off).fold((f32::MAX, f32::MIN), |(a, b), off| (a.min(off), b.max(off)));
         let is_flat = (most - least) * grid.voxel_m <= STROKE_M + 0.5 * grid.voxel_m;
-        (is_flat && slope.abs() <= STEEPEST).then(|| {
+        let found = (is_flat && slope.abs() <= STEEPEST).then(|| {
             let at = grid.cell_center(Cell { x: x as u16, y: 0 });
-            let y = grid.origin[1] + mean * grid.voxel_m;
+            // Midway between what the rim meets first and last, so that it may err either way.
+            let middle = mean + bulge * (0.5 * radius * radius - mean_square(&rows));
+            let y = grid.origin[1] + middle * grid.voxel_m;
             let contact = Voxel { x: x as u16, y: mean.round() as u16, z: level as u16 };
             (contact, Point::new(at.x, y, grid.origin[2] + z_m), slope)
-        })
+        });
+        let is_new =
+            |touch: &Point| self.unsealed.iter().all(|at| (Point::from(*at) - touch).norm() > TRIED_APART * radius_m);
+        found.filter(|(_, touch, _)| is_new(touch))
     }
 
     /// What is asked of voxels, for `work`.
@@ -127,6 +134,30 @@ impl<'a> Shelf<'a> {
         };
         work(&Room { grid: &belief.grid, blocks: &blocks, is_taken: &is_taken, is_unknown: &is_unknown })
     }
+}
+
+/// A front over the cup's circle: `row = mean + slope i + bulge (i^2 - mean of i^2)`, in cells; `i` is the column from the middle.
+struct Front {
+    mean: f32,
+    slope: f32,
+    bulge: f32,
+}
+
+impl Front {
+    /// The least squares fit to pairs of column and row, the columns symmetric about 0. A front never bulges inwards.
+    fn fit(rows: &[(f32, f32)]) -> Self {
+        let of = |weight: &dyn Fn(f32) -> f32| {
+            let sums = rows.iter().map(|(i, row)| (weight(*i) * row, weight(*i).powi(2)));
+            let (product, square) = sums.fold((0.0, 0.0), |(a, b), (c, d)| (a + c, b + d));
+            if square > 0.0 { product / square } else { 0.0 }
+        };
+        let square = mean_square(rows);
+        Self { mean: of(&|_| 1.0), slope: of(&|i| i), bulge: of(&|i| i * i - square).max(0.0) }
+    }
+}
+
+fn mean_square(rows: &[(f32, f32)]) -> f32 {
+    rows.iter().map(|(i, _)| i * i).sum::<f32>() / rows.len() as f32
 }
 
 /// Everything that can be taken, and what stands first but cannot, from left to right.

@@ -4,17 +4,18 @@
 //! off when it is pulled sideways with more than friction holds (0.4, rubber on cardboard: [`PULL_N`]) or bent about the rim
 //! with more than `p A r` ([`BEND_NM`]).
 
-use super::{Physics, TIME_STEP_S, from_rapier, to_rapier, to_rapier_pose};
+use super::{HELD, OBJECT, Physics, TIME_STEP_S, from_rapier, groups, to_rapier, to_rapier_pose};
 use crate::arm::{Arm, Joints, pose_of};
 use crate::{Point, Vector};
 use rapier3d::dynamics::{FixedJointBuilder, ImpulseJointHandle};
 use rapier3d::math::Pose as RapierPose;
 use rapier3d::parry::query::Ray;
+use rapier3d::prelude::{Group, RigidBodyHandle};
 
 /// How far the bellows gives way: the rim seals on what is at most so far behind it, uncompressed, metres.
 pub const STROKE_M: f32 = 0.008;
 /// How far before the rim a surface may be that the lip still meets, metres.
-const LIP_M: f32 = 0.002;
+pub const LIP_M: f32 = 0.002;
 /// Load at which what is held comes off, newtons.
 pub const PULL_N: f32 = 30.0;
 /// Moment about the cup's middle at which it comes off, newton metres.
@@ -86,7 +87,22 @@ impl Physics {
             .local_frame2(RapierPose::IDENTITY)
             .contacts_enabled(false);
         let joint = self.world.insert_impulse_joint(hand, object, joint.build());
+        self.join_group(object, OBJECT | HELD);
         self.held = Some(Held { at, joint, loaded_steps: 0 });
+    }
+
+    /// Puts an object's colliders into some groups.
+    ///
+    /// The cup has pressed on the object before it holds it. Rapier goes on with a contact as long as the two hardly move to
+    /// each other, without asking again whether they may touch; a change of groups makes it ask.
+    fn join_group(&mut self, object: RigidBodyHandle, memberships: Group) {
+        let colliders = self.world.bodies.get(object).map(|body| body.colliders().to_vec()).unwrap_or_default();
+        for handle in colliders {
+            if let Some(collider) = self.world.colliders.get_mut(handle) {
+                let filter = collider.collision_groups().filter;
+                collider.set_collision_groups(groups(memberships, filter));
+            }
+        }
     }
 
     /// The object in hand.
@@ -124,6 +140,7 @@ impl Physics {
     pub(in crate::world) fn let_go(&mut self) {
         if let Some(held) = self.held.take() {
             self.world.remove_impulse_joint(held.joint);
+            self.join_group(self.handles[held.at], OBJECT);
             self.world.wake_up(self.handles[held.at], true);
         }
     }

@@ -25,7 +25,7 @@ for line in sys.stdin:
     if looks == 3:
         told = json.loads(answer)
         if kind == "late":
-            time.sleep(4)
+            time.sleep(15)
         elif kind == "twice":
             answer += answer
         elif kind == "crash":

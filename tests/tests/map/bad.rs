@@ -185,7 +185,7 @@ fn what_cannot_be_asked_of_a_recording() {
     assert!(refused(&folder, &["--budget", "9"]).contains("--budget 9: the recording has 2 frames to map"));
     assert!(refused(&folder, &["--every", "0"]).contains("--every 0"));
     assert!(refused(&folder, &["--edge-angle", "90"]).contains("--edge-angle 90: must be from 0 to 45"));
-    assert!(refused(&folder, &["--depth-unit", "-1"]).contains("must be a number above 0"));
+    assert!(refused(&folder, &["--depth-unit", "0"]).contains("must be a number above 0"));
     let board = folder.write("board.toml", "format = 1\nsize = [0.8, 0.4]\n");
     assert!(refused(&folder, &["--board", &board]).contains("board.toml: line 2: 2 numbers where 3 are needed"));
     assert!(nudge_ok(&["map", "--help"]).contains("--find-board"));

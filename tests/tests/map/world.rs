@@ -52,7 +52,7 @@ fn a_world_that_misbehaves_ends_the_run_in_one_line_and_nothing_is_lost() {
     nudge_ok(&run(&scene, &world(&written, ""), &whole));
     let whole = beliefs(Path::new(&whole));
     let cases = [
-        ("late", "the world did not answer within 2 s (looking from view"),
+        ("late", "the world did not answer within 5 s (looking from view"),
         ("twice", "the world spoke without being asked, or answered twice: {\"id\": 3"),
         ("crash", "the world ended (looking from view"),
         ("nonsense", "the world answered what is no answer (expected value"),
@@ -69,7 +69,7 @@ fn a_world_that_misbehaves_ends_the_run_in_one_line_and_nothing_is_lost() {
         let folder = written.folder.name("images");
         let mut command = run(&scene, &bad, &out);
         if kind == "late" {
-            *command.last_mut().expect("a timeout") = "2";
+            *command.last_mut().expect("a timeout") = "5";
         }
         command.extend(["--world-folder", &folder]);
         let line = nudge_fails(2, &command);

@@ -383,7 +383,7 @@ impl App {
     /// Whether anything is under way.
     pub fn is_busy(&self) -> bool {
         !self.openings.is_empty()
-            || self.model.sessions.iter().any(|session| session.activity != Activity::Idle)
+            || self.model.sessions.iter().any(|session| session.activity != Activity::Idle || session.queued)
             || self.background.is_busy()
             || self.model.author.is_counting()
             || !self.tasks.under_way().is_empty()

@@ -198,16 +198,14 @@ impl Session {
     /// Whether it is at something that a person asked for.
     pub fn can_be_cancelled(&self) -> bool {
         match self.activity {
-            Activity::Idle => false,
-            Activity::Checking { .. } => self.queued,
+            Activity::Idle | Activity::Checking { .. } => self.queued,
             _ => true,
         }
     }
 
     /// Whether it can be told to decide or to run: idle, or to do so once its log is checked.
     pub fn takes_orders(&self) -> bool {
-        let waits = matches!(self.activity, Activity::Checking { .. }) && !self.queued;
-        self.is_open() && (self.activity == Activity::Idle || waits)
+        self.is_open() && !self.queued && matches!(self.activity, Activity::Idle | Activity::Checking { .. })
     }
 
     /// The state after `step` actions, or the last one there is.

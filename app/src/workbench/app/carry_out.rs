@@ -322,7 +322,7 @@ impl App {
             return Err((Level::Info, "The budget is used up; branch from an earlier step to continue"));
         }
         match session.activity {
-            Activity::Idle => session.activity = activity,
+            Activity::Idle if !session.queued => session.activity = activity,
             // What was decided before holds for what was filed; a decision or a run can wait for the check.
             Activity::Checking { .. } if session.takes_orders() && matches!(order, Order::Decide | Order::Run) => {
                 session.queued = true;

@@ -64,7 +64,7 @@ impl App {
                 if let Some(opening) = self.openings.get_mut(&id) {
                     opening.activity = activity;
                 } else if let Some(session) = self.model.session_of_mut(id) {
-                    session.queued &= matches!(activity, Activity::Checking { .. });
+                    session.queued &= !matches!(activity, Activity::Deciding | Activity::Running);
                     session.pausing &= activity != Activity::Idle;
                     session.activity = activity;
                 }
@@ -89,8 +89,9 @@ impl App {
             }
             Event::Failed(words) => {
                 self.openings.remove(&id);
-                if self.model.session_of(id).is_none() {
-                    self.workers.remove(&id);
+                match self.model.session_of_mut(id) {
+                    Some(session) => session.queued = false,
+                    None => drop(self.workers.remove(&id)),
                 }
                 if words != "cancelled" {
                     self.model.toasts.tell(Level::Error, words);
@@ -100,7 +101,7 @@ impl App {
                 self.openings.remove(&id);
                 self.workers.remove(&id);
                 if let Some(session) = self.model.session_of_mut(id) {
-                    session.activity = Activity::Idle;
+                    (session.activity, session.queued) = (Activity::Idle, false);
                     session.read_only = Some("a fault of the program stopped it".to_owned());
                     let (path, steps) = (session.path.clone(), session.steps());
                     self.dialog = Some(Dialog::Broke { id, words, path, steps });

@@ -29,7 +29,7 @@ pub(crate) use decision::mishaps;
 use crate::picture;
 use crate::verdicts::Judged;
 use disk::{Disk, Fault};
-use nudge_core::arm::{ArmTool, Joints};
+use nudge_core::arm::ArmTool;
 use nudge_core::belief::{Belief, Prediction};
 use nudge_core::camera::{Frame, ViewArray, ViewId};
 use nudge_core::episode::{Episode, EpisodeRecord, NO_TRUTH, StepOutcome, StepRecord};
@@ -255,50 +255,6 @@ impl Recorder {
             .with_markers([rerun::components::MarkerShape::Up])
             .with_marker_sizes([5.0_f32]);
         self.fix(&paths::score(paths::SCORE_PUSH), &pushes)
-    }
-
-    /// Records how the arm moved in a step: pose by pose on the robot's own clock, and on the steps' timeline where it
-    /// looked, or the end of its push.
-    fn robot(&mut self, setting: &Setting<'_>, step: usize, outcome: Option<&StepOutcome>) -> Result<()> {
-        self.stream.set_time_sequence(paths::TIMELINE, step as i64);
-        self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s);
-        let arm = setting.arm;
-        let pose = |joints: &Joints| {
-            let transforms = robot::transforms(arm, joints);
-            transforms
-                .iter()
-                .enumerate()
-                .try_for_each(|(number, transform)| self.log(&paths::robot_body(number), transform))
-        };
-        let moved = outcome.and_then(|outcome| Some((outcome, outcome.motion.as_ref()?)));
-        let Some((outcome, motion)) = moved else {
-            if let (None, Some(ready)) = (outcome, &arm.ready) {
-                pose(ready)?;
-            }
-            return self.log(paths::ROBOT_PATH, &rerun::Clear::flat());
-        };
-        self.log(paths::ROBOT_PATH, &robot::path(arm, motion))?;
-        let held = robot::Held::in_step(arm, outcome).and_then(|held| Some((*self.shown.get(&held.object)?, held)));
-        for (at_s, joints) in robot::frames(motion) {
-            self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + at_s);
-            pose(&joints)?;
-            // What is in hand goes with it.
-            if let Some((before, held)) = &held
-                && let Some(pose) = held.pose_at(at_s, before)
-            {
-                self.log(&paths::object(held.object), &shapes::transform(&pose))?;
-            }
-        }
-        // The last row of a step is the one that its timeline shows.
-        let pushes = matches!(outcome.record.action, Action::Manipulate(_));
-        let shown_s = robot::shown_at_s(arm, motion, &outcome.record.decision, pushes);
-        if let Some(joints) = motion.at(shown_s) {
-            self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + shown_s);
-            pose(&joints)?;
-        }
-        self.robot_s += motion.duration_s();
-        self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s);
-        Ok(())
     }
 
     /// Records bodies, belief, truth, error and scores.

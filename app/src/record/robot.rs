@@ -1,13 +1,14 @@
 //! The arm: its links, the path of its tip, and the views that its hand can reach.
 
 use super::shapes::{self, REJECTED_RGB};
+use super::{Recorder, Setting, paths};
 use crate::colors::Rgb;
-use nudge_core::Pose;
 use nudge_core::arm::{ArmTool, Joints, Motion, Part, Role, pose_of};
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::episode::StepOutcome;
-use nudge_core::plan::Decision;
+use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::ObjectId;
+use nudge_core::{Pose, Result};
 
 pub(crate) const LINK_RGB: Rgb = [150, 164, 180];
 pub(crate) const TOOL_RGB: Rgb = [72, 74, 80];
@@ -104,4 +105,50 @@ pub fn reachable(array: &ViewArray, unreachable: &[ViewId]) -> rerun::Points3D {
                 .map(|view| rerun::Color::from(if reached(&view.id) { REACHED_RGB } else { REJECTED_RGB })),
         )
         .with_radii(array.views.iter().map(|view| if reached(&view.id) { 0.005_f32 } else { 0.003 }))
+}
+
+impl Recorder {
+    /// Records how the arm moved in a step: pose by pose on the robot's own clock, and on the steps' timeline where it
+    /// looked, or the end of its push.
+    pub(super) fn robot(&mut self, setting: &Setting<'_>, step: usize, outcome: Option<&StepOutcome>) -> Result<()> {
+        self.stream.set_time_sequence(paths::TIMELINE, step as i64);
+        self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s);
+        let arm = setting.arm;
+        let pose = |joints: &Joints| {
+            let transforms = transforms(arm, joints);
+            transforms
+                .iter()
+                .enumerate()
+                .try_for_each(|(number, transform)| self.log(&paths::robot_body(number), transform))
+        };
+        let moved = outcome.and_then(|outcome| Some((outcome, outcome.motion.as_ref()?)));
+        let Some((outcome, motion)) = moved else {
+            if let (None, Some(ready)) = (outcome, &arm.ready) {
+                pose(ready)?;
+            }
+            return self.log(paths::ROBOT_PATH, &rerun::Clear::flat());
+        };
+        self.log(paths::ROBOT_PATH, &path(arm, motion))?;
+        let held = Held::in_step(arm, outcome).and_then(|held| Some((*self.shown.get(&held.object)?, held)));
+        for (at_s, joints) in frames(motion) {
+            self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + at_s);
+            pose(&joints)?;
+            // What is in hand goes with it.
+            if let Some((before, held)) = &held
+                && let Some(pose) = held.pose_at(at_s, before)
+            {
+                self.log(&paths::object(held.object), &shapes::transform(&pose))?;
+            }
+        }
+        // The last row of a step is the one that its timeline shows.
+        let pushes = matches!(outcome.record.action, Action::Manipulate(_));
+        let shown_s = shown_at_s(arm, motion, &outcome.record.decision, pushes);
+        if let Some(joints) = motion.at(shown_s) {
+            self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s + shown_s);
+            pose(&joints)?;
+        }
+        self.robot_s += motion.duration_s();
+        self.stream.set_duration_secs(paths::ROBOT_TIMELINE, self.robot_s);
+        Ok(())
+    }
 }

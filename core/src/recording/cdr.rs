@@ -92,7 +92,9 @@ mod tests {
 
     #[test]
     fn numbers_stand_at_multiples_of_their_size_in_either_byte_order() {
-        let little = [0, 1, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'a', 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f];
+        let mut little = vec![0, 1, 0, 0, 7, 0, 0, 0, 2, 0, 0, 0, b'a', 0];
+        little.extend([0; 6]);
+        little.extend(1.0_f64.to_le_bytes());
         let mut cdr = Cdr::new(&little).expect("plain");
         assert_eq!((cdr.u8(), cdr.string(), cdr.f64()), (Ok(7), Ok("a".to_owned()), Ok(1.0)));
         assert!(cdr.u8().is_err_and(|words| words == SHORT));

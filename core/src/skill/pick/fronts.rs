@@ -12,8 +12,10 @@ use crate::world::STROKE_M;
 const HEIGHTS_M: [f32; 2] = [0.03, 0.12];
 /// Heights that are tried, from the middle of the object on, metres.
 const TRIED_M: [f32; 5] = [0.0, 0.02, -0.02, 0.04, -0.04];
+/// Rows before the first solid voxel in which the front may be.
+const UNSURE_ROWS: usize = 2;
 /// How far from where it did not seal a cup is tried again, in radii.
-const TRIED_APART: f32 = 0.75;
+const TRIED_APART: f32 = 1.0;
 /// Largest tangent of the angle between a front and the entrance's plane: 30 degrees.
 const STEEPEST: f32 = 0.577;
 /// Occupancy probability above which nothing is set down in a voxel.
@@ -62,13 +64,14 @@ impl<'a> Shelf<'a> {
         objects
     }
 
-    /// Where the front of an object is at a column and level: the row of its first solid voxel.
-    fn front(&self, target: &Patch, x: usize, level: usize) -> Option<usize> {
+    /// Where the front of an object is expected at a column and level, in rows: its first solid voxel, less what is believed
+    /// of the voxels right before it. The front lies within one of them, which is therefore less sure.
+    fn front(&self, target: &Patch, x: usize, level: usize) -> Option<f32> {
         let grid = &self.belief.grid;
-        (0..grid.dims[1]).find(|y| {
-            let cell = x * grid.dims[1] + y;
-            target.contains(cell) && self.belief.probability(grid.column(cell).start + level) > AVOIDED
-        })
+        let probability = |y: usize| self.belief.probability(grid.column(x * grid.dims[1] + y).start + level);
+        let first = (0..grid.dims[1]).find(|y| target.contains(x * grid.dims[1] + y) && probability(*y) > AVOIDED)?;
+        let before = (first.saturating_sub(UNSURE_ROWS)..first).map(probability).sum::<f32>();
+        Some(first as f32 - before)
     }
 
     /// The place on an object's front where the cup fits that is nearest to its middle: where the cup touches, and the
@@ -102,7 +105,7 @@ impl<'a> Shelf<'a> {
                 if column >= grid.dims[0] || level >= grid.dims[2] {
                     return None;
                 }
-                rows.push((i as f32, self.front(target, column, level)? as f32));
+                rows.push((i as f32, self.front(target, column, level)?));
             }
         }
         let Front { mean, slope, bulge } = Front::fit(&rows);
@@ -114,7 +117,7 @@ impl<'a> Shelf<'a> {
             // Midway between what the rim meets first and last, so that it may err either way.
             let middle = mean + bulge * (0.5 * radius * radius - mean_square(&rows));
             let y = grid.origin[1] + middle * grid.voxel_m;
-            let contact = Voxel { x: x as u16, y: mean.round() as u16, z: level as u16 };
+            let contact = Voxel { x: x as u16, y: mean.ceil() as u16, z: level as u16 };
             (contact, Point::new(at.x, y, grid.origin[2] + z_m), slope)
         });
         let is_new =

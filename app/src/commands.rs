@@ -11,6 +11,7 @@ mod calibrate;
 mod data;
 mod doctor;
 mod manual;
+mod map;
 mod mesh;
 #[cfg(not(feature = "workbench"))]
 mod no_window;
@@ -58,6 +59,8 @@ enum Command {
     Shot(shot::Args),
     /// Map a scene with a policy and write the episode
     Run(run::Args),
+    /// Map a recording that a real camera or another program made, and write the episode
+    Map(map::Args),
     /// Run policies on sets of scenes, and put shards of that together
     Bench(bench::Args),
     /// Re-run an episode from its log and verify every step
@@ -129,6 +132,7 @@ pub fn main() -> ExitCode {
         #[cfg(not(feature = "workbench"))]
         None => Ok(()),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Map(args)) => map::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Probe(args)) => probe::run(&args),

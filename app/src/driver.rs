@@ -9,11 +9,12 @@ use crate::made_by;
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
 use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical};
-use nudge_core::camera::{ViewArray, hidden_objects};
+use nudge_core::camera::hidden_objects;
 use nudge_core::cnabu;
+use nudge_core::environment::Environment;
 use nudge_core::episode::{
     Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Observer, Overwrite, StepOutcome, resume,
-    resume_from_checkpoint,
+    resume_from_checkpoint, resume_within,
 };
 use nudge_core::files::{remove_if_there, temporary_of};
 use nudge_core::plan::{Decision, PolicyKind};
@@ -111,7 +112,29 @@ impl Driver {
         overwrite: Overwrite,
         frames: Frames,
     ) -> Result<Self> {
-        let mut episode = Episode::new(scene, catalog, config, update)?;
+        Self::of(Episode::new(scene, catalog, config, update)?, out, overwrite, frames)
+    }
+
+    /// Starts an episode in an environment of the caller's, as [`Driver::start`] does in a simulated one.
+    ///
+    /// # Errors
+    /// What [`Episode::within`] and [`EpisodeDir::create`] refuse; nothing is written then.
+    #[expect(clippy::too_many_arguments, reason = "what an episode is made of, and where it goes")]
+    pub fn start_within(
+        environment: Box<dyn Environment>,
+        scene: Scene,
+        catalog: Arc<Catalog>,
+        config: EpisodeConfig,
+        update: Arc<dyn BeliefUpdate>,
+        out: &Path,
+        overwrite: Overwrite,
+        frames: Frames,
+    ) -> Result<Self> {
+        Self::of(Episode::within(environment, scene, catalog, config, update)?, out, overwrite, frames)
+    }
+
+    /// Begins to write an episode that was just set up.
+    fn of(mut episode: Episode, out: &Path, overwrite: Overwrite, frames: Frames) -> Result<Self> {
         episode.built_from(made_by::build());
         let mut directory = EpisodeDir::create(out, overwrite)?.with_frames(frames);
         let mut recorder = Recorder::create(&out.join(RECORDING), &episode)?;
@@ -156,10 +179,33 @@ impl Driver {
         update: Arc<dyn BeliefUpdate>,
         watch: Observer<'_>,
     ) -> Result<Self> {
+        Self::resume_by(out, watch, |observer| resume(out, catalog, update, observer))
+    }
+
+    /// Goes on with an episode whose environment is not simulated and is back; as [`Driver::resume`].
+    ///
+    /// # Errors
+    /// What [`resume_within`] refuses.
+    pub fn resume_within(
+        environment: Box<dyn Environment>,
+        out: &Path,
+        catalog: Arc<Catalog>,
+        update: Arc<dyn BeliefUpdate>,
+        watch: Observer<'_>,
+    ) -> Result<Self> {
+        Self::resume_by(out, watch, |observer| resume_within(out, environment, catalog, update, observer))
+    }
+
+    /// Resumes in one way or another, and records anew what is gone through.
+    fn resume_by(
+        out: &Path,
+        watch: Observer<'_>,
+        resume: impl FnOnce(Observer<'_>) -> Result<(EpisodeDir, Episode)>,
+    ) -> Result<Self> {
         // Beside the old recording, which stays unless the whole log leads where it says.
         let anew = temporary_of(&out.join(RECORDING));
         let mut begun: Option<(Recorder, Story)> = None;
-        let resumed = resume(out, catalog, update, &mut |episode, outcome| {
+        let resumed = resume(&mut |episode, outcome| {
             if let (Some((recorder, story)), Some(outcome)) = (&mut begun, outcome) {
                 recorder.step(episode, outcome)?;
                 story.note(episode);
@@ -215,7 +261,7 @@ impl Driver {
     /// For a view array that cannot be read any more.
     pub fn hidden(&self) -> Result<Vec<ObjectId>> {
         let record = self.episode.record();
-        Ok(hidden_objects(&record.scene.shelf, &self.story.start, &ViewArray::named(&record.config.views)?))
+        Ok(hidden_objects(&record.scene.shelf, &self.story.start, &record.view_array()?))
     }
 
     /// Ends the recording, draws the summary figure beside it, and gives the episode back.

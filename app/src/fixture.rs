@@ -149,6 +149,7 @@ fn record(scene: Scene, prior: Scores, budget: usize) -> EpisodeRecord {
             planner: PlannerSettings::default(),
             noise: None,
         },
+        recorded_views: None,
         prior: prior.into(),
         steps: Vec::new(),
     }

@@ -12,6 +12,7 @@ mod pinhole;
 mod project;
 mod reach;
 mod render;
+mod view_record;
 mod views;
 mod visibility;
 mod watch;
@@ -62,7 +63,7 @@ impl Intrinsics {
 }
 
 /// One candidate camera pose.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// Its position in the array.
     pub id: ViewId,
@@ -81,8 +82,9 @@ impl View {
     }
 }
 
-/// An array of candidate views that share one camera.
-#[derive(Clone, Debug)]
+/// An array of candidate views that share one camera. Serialises with all of its poses, to the bit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "view_record::Filed", into = "view_record::Filed")]
 pub struct ViewArray {
     /// `standard300`, `real75`, or the name in a file of one's own.
     pub name: String,

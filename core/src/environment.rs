@@ -4,13 +4,17 @@
 //! view, has a motion carried out and is told what happened; if the surroundings know the truth, it is scored. Whatever can
 //! do the first two runs every policy but those that know what would happen ([`Environment::simulated`]).
 
+mod external;
+mod recorded;
 mod simulated;
 
+pub use external::{External, PROTOCOL, WorldSettings};
+pub use recorded::Recorded;
 pub use simulated::Simulated;
 
 use crate::Result;
 use crate::arm::{Arm, PhasedMotion};
-use crate::camera::{Intrinsics, Sensed, View};
+use crate::camera::{Intrinsics, Sensed, View, ViewArray};
 use crate::world::{ManipulationOutcome, TruthMap};
 
 /// What an episode maps.
@@ -35,6 +39,12 @@ pub trait Environment: Send + Sync {
 
     /// A copy that goes its own way from here on, if there can be one.
     fn branch(&self) -> Option<Box<dyn Environment>>;
+
+    /// The only views from which there are frames, where it is the environment that says which; the episode then files them.
+    /// No arm is asked whether its hand can be there. `None` of an environment whose camera goes where it is sent.
+    fn views(&self) -> Option<&ViewArray> {
+        None
+    }
 
     /// The simulation, for policies that know what would happen and for probes; `None` of everything else.
     fn simulated(&self) -> Option<&Simulated> {

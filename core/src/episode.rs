@@ -26,7 +26,7 @@ mod told_file;
 
 pub use directory::{DirectoryState, EpisodeDir, Frames, Overwrite};
 pub use estimate::Told;
-pub use filed::Observer;
+pub use filed::{Observer, resume_within};
 pub use infer::infer;
 pub use judgement::{Judgement, NO_TRUTH, Prior};
 pub use machine::Episode;

@@ -3,7 +3,7 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> arm -> world -> camera -> environment -> belief -> cnabu -> gain -> skill -> plan -> made_by -> score -> episode -> probe -> learn
+//! grid -> solid -> scene -> arm -> world -> camera -> recording -> environment -> belief -> cnabu -> gain -> skill -> plan -> made_by -> score -> episode -> probe -> learn
 //! ```
 //!
 //! Beside them stand what all of them may use: [`error`], [`files`], [`places`], [`rng`], [`shard`] and [`wall`].
@@ -28,6 +28,7 @@ mod named;
 pub mod places;
 pub mod plan;
 pub mod probe;
+pub mod recording;
 pub mod rng;
 pub mod scene;
 pub mod score;

@@ -14,6 +14,8 @@ mod change;
 mod engine;
 #[path = "fuzz/episodes.rs"]
 mod episodes;
+#[path = "fuzz/foreign.rs"]
+mod foreign;
 #[path = "fuzz/meshes.rs"]
 mod meshes;
 #[cfg(feature = "workbench")]

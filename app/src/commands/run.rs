@@ -1,6 +1,7 @@
 //! `nudge run`: map a scene with a policy and write the episode.
 
 mod table;
+mod world;
 
 use super::progress::Progress;
 use crate::driver::{Driver, belief_update, default_out};
@@ -58,6 +59,8 @@ pub struct Args {
     /// Do not file frames
     #[arg(long)]
     no_frames: bool,
+    #[command(flatten)]
+    world: world::Args,
     /// Print episode.json instead of the table
     #[arg(long)]
     json: bool,
@@ -127,6 +130,7 @@ fn beside_of(out: &Path, policy: PolicyKind) -> PathBuf {
 fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, out: &Path) -> anyhow::Result<Driver> {
     let scene = scene.with_hand_for(policy.picks());
     let update = belief_update(args.planning.belief.as_deref(), policy)?;
+    let outside = args.world.command.is_some();
     let config = EpisodeConfig {
         policy,
         belief: update.name().to_owned(),
@@ -139,16 +143,22 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
     if !(args.resume && EpisodeDir::state(out)? == DirectoryState::Episode) {
         let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
         let frames = if args.no_frames && !args.frames { Frames::Left } else { Frames::Filed };
+        if outside {
+            return Ok(world::start(&args.world, scene, catalog, config, update, out, (overwrite, frames))?);
+        }
         return Ok(Driver::start(scene, catalog, config, update, out, overwrite, frames)?);
     }
     let logged = EpisodeDir::open(out)?.record()?;
-    same_episode(&logged, &scene, &config, out)?;
+    let filed = if outside { world::unknown(&scene) } else { scene.clone() };
+    same_episode(&logged, &filed, &config, out)?;
     let progress = Progress::new("repeating", logged.steps.len());
     let mut watch = |episode: &Episode, _: Option<&StepOutcome>| {
         progress.at(episode.record().steps.len());
         Ok(())
     };
-    let driver = if args.verify {
+    let driver = if outside {
+        world::go_on(&args.world, &scene, &logged, catalog, update, out, &mut watch)?
+    } else if args.verify {
         Driver::resume(out, catalog, update, &mut watch)?
     } else {
         Driver::go_on(out, catalog, update, &mut watch)?

@@ -39,6 +39,7 @@ pub fn of(setting: &Setting<'_>, gain: &plan::Gain, outcome: &StepOutcome) -> Op
     let record = &outcome.record;
     let done = match record.action {
         Action::Manipulate(manipulation) => manipulation,
+        Action::Look { .. } if record.decision.gains.is_empty() => return None,
         Action::Look { view } => {
             let nats = gain.per_voxel(setting.views, view, RayDensity::FULL);
             return Gain::new(&format!("Gain of the look from view {}", view.0), nats);

@@ -6,7 +6,7 @@ use super::session::{Moment, Setup};
 use super::worker::told::Opened;
 use nudge_core::Result;
 use nudge_core::arm::{Arm, ArmTool};
-use nudge_core::camera::{NoiseModel, ViewArray};
+use nudge_core::camera::NoiseModel;
 use nudge_core::episode::{EpisodeDir, EpisodeRecord, StepOutcome, StepRecord, Told};
 use nudge_core::grid::VoxelSet;
 use nudge_core::plan::Action;
@@ -59,9 +59,11 @@ pub fn open(path: &Path, catalog: Arc<Catalog>) -> Result<Opened> {
 }
 
 fn setup(record: &EpisodeRecord, catalog: Arc<Catalog>) -> Result<Setup> {
-    let views = ViewArray::named(&record.config.views)?;
+    let views = record.view_array()?;
     let arm = ArmTool::new(Arm::placed(&record.scene.robot)?, record.scene.shelf);
-    let unreachable = views.unreachable(&views.hand_poses(&arm));
+    // A recording's views were taken: whoever carried the camera.
+    let unreachable =
+        if record.recorded_views.is_some() { Vec::new() } else { views.unreachable(&views.hand_poses(&arm)) };
     Ok(Setup {
         catalog,
         views: Arc::new(views),

@@ -133,9 +133,11 @@ fn choose(app: &mut App, step: Option<usize>, layout: LayoutKind) {
         let pushed = matches!(moment.outcome.as_ref()?.record.action, Action::Manipulate(_));
         pushed.then(|| moment.step - 1)
     });
-    // The last state of a finished episode has no decision to show; the one before it has.
+    // The last state of a finished episode has no decision to show; the one before it has. Of a recording of one frame that is
+    // the prior, which shows nothing at all.
     let explains = matches!(layout, LayoutKind::Episode | LayoutKind::Gains | LayoutKind::Push);
-    let last = session.steps() - usize::from(explains && session.is_finished() && session.steps() > 0);
+    let least = if session.record.has_truth() { 0 } else { 1 };
+    let last = session.steps() - usize::from(explains && session.is_finished() && session.steps() > least);
     let step = step.or(before_push.filter(|_| layout == LayoutKind::Push)).unwrap_or(last);
     let undecided = session.decision_after(step).is_none() && !session.is_finished() && session.read_only.is_none();
     app.ask(Command::GoTo(step));

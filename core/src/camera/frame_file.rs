@@ -17,6 +17,8 @@ use std::path::Path;
 const FORMAT: u32 = 1;
 /// How hard the compressor tries; what is gained beyond it is not worth the time.
 const LEVEL: i32 = 9;
+/// The same for frames of real cameras, whose noise no effort makes smaller.
+const NOISY_LEVEL: i32 = 1;
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -63,7 +65,7 @@ impl Sensed {
             PixelClasses::Scores(scores) => content.extend(scores.iter().flat_map(|score| score.to_le_bytes())),
         }
         content.extend(self.objects.iter().flatten().flat_map(|object| object.to_le_bytes()));
-        with_head(&head, &content, LEVEL)
+        with_head(&head, &content, if self.objects.is_some() { LEVEL } else { NOISY_LEVEL })
     }
 
     /// Reads a file's bytes; `file` is what errors name.

@@ -86,7 +86,7 @@ impl Pinhole {
     }
 
     /// What is wrong with it: the field and the words.
-    pub(super) fn check(&self) -> Result<(), (&'static str, String)> {
+    pub(crate) fn check(&self) -> Result<(), (&'static str, String)> {
         let [near, far] = self.depth_range_m;
         if !((1..=4096).contains(&self.width) && (1..=4096).contains(&self.height)) {
             let words = format!("an image of {} x {} pixels; 1 to 4096 are allowed", self.width, self.height);

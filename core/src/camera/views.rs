@@ -99,6 +99,9 @@ impl RawView {
 }
 
 impl ViewArray {
+    /// The name of an array of views that are not candidates of a camera but were recorded.
+    pub const RECORDED: &str = "recorded";
+
     /// The array of a name: `standard300`, `real75`, or a path to a file of one's own (anything with a slash, or that
     /// ends in `.toml`).
     ///
@@ -183,7 +186,7 @@ impl ViewArray {
     }
 }
 
-fn check_camera(camera: &Intrinsics) -> std::result::Result<(), String> {
+pub(super) fn check_camera(camera: &Intrinsics) -> std::result::Result<(), String> {
     if !(camera.focal_px.is_finite() && camera.focal_px >= 1.0) {
         return Err(format!("focal_px is {}, at least 1 is needed", camera.focal_px));
     }

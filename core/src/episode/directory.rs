@@ -7,7 +7,7 @@
 //! frames/NNN.frame    what the camera gave in step NNN, a look; optional
 //! frames/NNN.push     what the arm swept in step NNN, a push; optional
 //! checkpoints/NNN.state   the exact state after the last step, from which a stopped run goes on
-//! episode.rrd, summary.png, notes.json      written by others, removed with the episode they belong to
+//! episode.rrd, summary.png, notes.json, board.toml      written by others, removed with the episode they belong to
 //! ```
 //!
 //! Every file is there whole or not at all, and `episode.json` is renamed last: everything that it names is there. A
@@ -42,7 +42,7 @@ const NUMBERED: [(&str, &str); 5] =
 /// The folders, each once.
 const FOLDERS: [&str; 4] = [BELIEFS, TRUTH, FRAMES, CHECKPOINTS];
 /// Files of an episode that other parts write.
-const COMPANIONS: [&str; 3] = ["episode.rrd", "summary.png", "notes.json"];
+const COMPANIONS: [&str; 4] = ["episode.rrd", "summary.png", "notes.json", "board.toml"];
 
 /// What to do with an episode that is already there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

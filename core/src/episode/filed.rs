@@ -4,13 +4,15 @@ use super::directory::EpisodeDir;
 use super::estimate::Told;
 use super::machine::Episode;
 use super::record::{StepOutcome, StepRecord};
+use super::replay::{Comparison, tolerance};
 use crate::arm::{Arm, PhasedMotion};
 use crate::belief::{Belief, BeliefUpdate, Intervention, Prediction};
-use crate::camera::{Intrinsics, MapObservation, NoiseModel, Sensed, View, project};
+use crate::camera::{Intrinsics, MapObservation, NoiseModel, Sensed, View, ViewArray, project};
 use crate::environment::Environment;
 use crate::scene::Catalog;
 use crate::world::{ManipulationOutcome, TruthMap};
 use crate::{Error, Result};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Called for every state of an episode that is opened, with the outcome of the last action.
@@ -33,8 +35,8 @@ impl BeliefUpdate for Absent {
     }
 }
 
-/// An environment that is no longer there.
-struct Gone;
+/// An environment that is no longer there, with its views if they were its own.
+struct Gone(Option<ViewArray>);
 
 impl Environment for Gone {
     fn frame(&mut self, _: &View, _: &Intrinsics) -> Result<Sensed> {
@@ -50,7 +52,11 @@ impl Environment for Gone {
     }
 
     fn branch(&self) -> Option<Box<dyn Environment>> {
-        Some(Box::new(Self))
+        Some(Box::new(Self(self.0.clone())))
+    }
+
+    fn views(&self) -> Option<&ViewArray> {
+        self.0.as_ref()
     }
 }
 
@@ -65,7 +71,8 @@ pub(super) fn look_through(
     let logged = directory.record()?;
     let update = update.unwrap_or_else(|| Arc::new(Absent(logged.config.belief.clone())));
     let scene = logged.scene.clone();
-    let mut episode = Episode::within(Box::new(Gone), scene, catalog, logged.config.clone(), update)?;
+    let mut episode =
+        Episode::within(Box::new(Gone(logged.recorded_views.clone())), scene, catalog, logged.config.clone(), update)?;
     let has_frames = directory.check_frames(&logged).is_ok();
     for done in 0..=logged.steps.len() {
         let step = done.checked_sub(1).map(|at| &logged.steps[at]);
@@ -76,6 +83,50 @@ pub(super) fn look_through(
     }
     episode.adopt_log(logged);
     Ok(episode)
+}
+
+/// Goes on with the episode in `path` in an environment that is back: whatever its updates were told is told again, and every
+/// belief compared with the one that is filed. `observer` is shown the prior and every step.
+///
+/// # Errors
+/// [`Error::Input`] for an episode without frames, for one of a simulated shelf, and for other weights than those that made it;
+/// [`Error::Check`] where a belief differs from the one that is filed.
+pub fn resume_within(
+    path: impl AsRef<Path>,
+    environment: Box<dyn Environment>,
+    catalog: Arc<Catalog>,
+    update: Arc<dyn BeliefUpdate>,
+    observer: Observer<'_>,
+) -> Result<(EpisodeDir, Episode)> {
+    let directory = EpisodeDir::open_to_write(path.as_ref())?;
+    let logged = directory.record()?;
+    let refuse = |words: String| Error::input(directory.path(), "", format!("cannot be resumed: {words}"));
+    if logged.has_truth() {
+        return Err(refuse("it is an episode of a simulated shelf".to_owned()));
+    }
+    if let Some(words) = logged.other_weights(&*update) {
+        return Err(refuse(words));
+    }
+    directory.check_frames(&logged)?;
+    let (scene, config) = (logged.scene.clone(), logged.config.clone());
+    let mut episode = Episode::within(environment, scene, catalog, config, update)?;
+    if episode.record().recorded_views != logged.recorded_views {
+        return Err(refuse("the world that is back offers other views".to_owned()));
+    }
+    let mut comparison = Comparison::new(tolerance(&logged));
+    for done in 0..=logged.steps.len() {
+        let step = done.checked_sub(1).map(|at| &logged.steps[at]);
+        let told = step.map(|step| directory.read_told(step)).transpose()?;
+        let outcome = step.map(|step| episode.retell(step, told));
+        comparison.at(done);
+        comparison.belief(&directory, done, episode.belief())?;
+        observer(&episode, outcome.as_ref())?;
+    }
+    if let Some(found) = comparison.into_first_difference() {
+        return Err(Error::Check(format!("{}: cannot be resumed: {found}", directory.path().display())));
+    }
+    episode.adopt_log(logged);
+    Ok((directory, episode))
 }
 
 impl Episode {

@@ -16,10 +16,12 @@ use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::skill::{ArmClearance, Manipulation};
 use crate::world::TruthMap;
 use crate::{Error, Result};
+use check::check;
 use std::sync::Arc;
 use std::time::Instant;
 
 mod candidates;
+mod check;
 mod log;
 
 /// A running episode.
@@ -60,6 +62,7 @@ impl Episode {
         let scene = scene.with_hand_for(config.policy.picks());
         // Before the scene is given the time to settle.
         check(&scene, &config, &*update)?;
+        ViewArray::named(&config.views)?;
         let environment = Box::new(Simulated::new(&scene, &catalog)?);
         Self::within(environment, scene, catalog, config, update)
     }
@@ -77,15 +80,16 @@ impl Episode {
         update: Arc<dyn BeliefUpdate>,
     ) -> Result<Self> {
         check(&scene, &config, &*update)?;
+        let own = environment.views().cloned();
+        let views = own.clone().map_or_else(|| ViewArray::named(&config.views), Ok)?;
         let policy = config.policy;
         if policy.knows_the_future() && environment.simulated().is_none() {
             let message = format!("policy {policy} asks what would really happen, which only a simulated shelf tells");
             return Err(Error::Usage(message));
         }
-        let views = Arc::new(ViewArray::named(&config.views)?);
         let arm = Arc::new(ArmTool::new(Arm::placed(&scene.robot)?, scene.shelf));
         policy.check_hand(&arm.arm)?;
-        let hands = Arc::new(views.hand_poses(&arm));
+        let hands = Arc::new(if own.is_some() { vec![None; views.views.len()] } else { views.hand_poses(&arm) });
         let unreachable = Arc::new(views.unreachable(&hands));
         let estimate = Estimate::uniform(&scene.grid());
         let threads = rayon::current_num_threads();
@@ -96,13 +100,14 @@ impl Episode {
             also_made_by: Vec::new(),
             scene,
             config,
+            recorded_views: own,
             prior: Prior::of(&estimate.belief, environment.truth()),
             steps: Vec::new(),
         };
         Ok(Self {
             catalog,
             update,
-            views,
+            views: Arc::new(views),
             hand: arm.ready.map(HandPose::waiting),
             arm,
             hands,
@@ -451,19 +456,6 @@ impl Episode {
     pub fn history(&self) -> &History {
         &self.history
     }
-}
-
-/// Whether an episode can be begun.
-fn check(scene: &Scene, config: &EpisodeConfig, update: &dyn BeliefUpdate) -> Result<()> {
-    if config.belief != update.name() {
-        let message = format!("the episode is about belief `{}`, not `{}`", config.belief, update.name());
-        return Err(Error::Usage(message));
-    }
-    if config.budget == 0 {
-        return Err(Error::Usage("the budget must be at least one action".to_owned()));
-    }
-    update.check_grid(&scene.grid())?;
-    ViewArray::named(&config.views).map(drop)
 }
 
 /// What an action brought beside its belief.

@@ -3,7 +3,7 @@
 use super::judgement::{Judgement, Prior, RawJudgement};
 use crate::arm::Motion;
 use crate::belief::{BeliefUpdate, Prediction};
-use crate::camera::{Frame, MapObservation, NoiseModel};
+use crate::camera::{Frame, MapObservation, NoiseModel, ViewArray};
 use crate::made_by::MadeBy;
 use crate::plan::{Action, Decision, PlannerSettings, PolicyKind, Reason, Rule};
 use crate::scene::{ObjectId, Scene};
@@ -229,6 +229,9 @@ pub struct EpisodeRecord {
     /// Policy, belief, seed, budget, views and planner settings.
     #[serde(flatten)]
     pub config: EpisodeConfig,
+    /// The views of a recording, which no other file describes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recorded_views: Option<ViewArray>,
     /// Scores of the prior, or its entropy alone.
     pub prior: Prior,
     /// The steps so far.
@@ -252,6 +255,14 @@ impl EpisodeRecord {
         } else if self.steps.len() < self.config.budget && !last.is_some_and(|last| maker.is_same_maker(last)) {
             self.also_made_by.push(LaterMaker { from_step: self.steps.len() + 1, made_by: maker });
         }
+    }
+
+    /// The views of the episode: its own, or those of the array that its configuration names.
+    ///
+    /// # Errors
+    /// Those of [`ViewArray::named`].
+    pub fn view_array(&self) -> crate::Result<ViewArray> {
+        self.recorded_views.as_ref().map_or_else(|| ViewArray::named(&self.config.views), |views| Ok(views.clone()))
     }
 
     /// Whether the truth is known, so that beliefs are scored.

@@ -102,6 +102,7 @@ pub fn record(steps: usize) -> EpisodeRecord {
             planner: PlannerSettings::default(),
             noise: None,
         },
+        recorded_views: None,
         prior: scores(0).into(),
         steps: (1..=steps).map(step).collect(),
     }

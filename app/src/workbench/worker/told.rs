@@ -6,7 +6,7 @@ use crate::workbench::latest::Wake;
 use crate::workbench::packed_frame::PackedFrame;
 use crate::workbench::session::{Activity, Moment, SessionId, Setup};
 use nudge_core::belief::BeliefUpdate;
-use nudge_core::camera::{ViewArray, hidden_objects};
+use nudge_core::camera::hidden_objects;
 use nudge_core::episode::{Episode, EpisodeRecord, StepOutcome};
 use nudge_core::plan::{Action, Decision};
 use nudge_core::scene::ObjectId;
@@ -144,7 +144,7 @@ pub(in crate::workbench) fn setup(
     first: &Moment,
 ) -> Result<Setup> {
     let record = episode.record();
-    let views = ViewArray::named(&record.config.views)?;
+    let views = record.view_array()?;
     let hidden = hidden_objects(&record.scene.shelf, &first.bodies, &views);
     let name = |id: &ObjectId| {
         let object = record.scene.objects.get(usize::from(id.0));

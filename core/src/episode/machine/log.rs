@@ -7,13 +7,18 @@ use super::Episode;
 use crate::arm::HandPose;
 use crate::belief::Belief;
 use crate::environment::Environment;
-use crate::plan::History;
+use crate::plan::{Action, History};
 use std::sync::Arc;
 
 impl Episode {
     /// Adds a step of a log with the estimate after it.
     pub(in crate::episode) fn take_note(&mut self, step: &StepRecord, estimate: Estimate) {
         self.history.record(&step.decision, !step.dropped().is_empty(), step.grip());
+        let to = match step.action {
+            Action::Look { view } => self.hands.get(usize::from(view.0)).cloned().flatten(),
+            Action::Manipulate(_) => self.arm.ready.map(HandPose::waiting),
+        };
+        self.hand = self.hand.take().map(|from| to.unwrap_or(from));
         self.record.steps.push(step.clone());
         self.estimate = estimate;
     }

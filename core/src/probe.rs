@@ -1,4 +1,4 @@
-//! What pushes are worth: beside what the planner promised of each candidate, what it really does.
+//! What manipulations are worth: beside what the planner promised of each candidate, what it really does.
 //!
 //! An episode is gone through again up to a decision, so that the world stands as it stood; there every feasible push
 //! candidate is carried out in a copy of the world ([`crate::skill::Counterfactual`]). Over the candidates of a decision
@@ -8,8 +8,10 @@
 //! * Does the promise order pushes as the truth does? Spearman's rank correlation of candidate gain and truth.
 //! * What does the choice cost? The regret: the best candidate's truth minus that of the one with the largest promise.
 //!
-//! The mean over the candidates stands for a push at random.
+//! The mean over the candidates stands for a push at random. Beside them stands how well the belief predicts each: the
+//! cross-entropy of what is occupied afterwards, by the prediction and by the belief as it is.
 
+mod predicted;
 mod summary;
 
 pub use summary::{Measure, MeasureSummary, StepSummary};
@@ -21,7 +23,7 @@ use crate::plan::{Action, CandidateRecord, Reason, ranked};
 use crate::rng::stream;
 use crate::scene::Catalog;
 use crate::skill::{ArmClearance, Manipulation, PushTruth};
-use crate::world::TruthMap;
+use crate::world::{GripEnd, TruthMap};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -61,6 +63,13 @@ pub struct ProbedPush {
     pub toppled: Vec<String>,
     /// Sum of the objects' displacements, metres.
     pub displacement_m: f64,
+    /// How holding an object ended, of a pick.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grip: Option<GripEnd>,
+    /// How well the belief's prediction tells what is occupied after it: cross-entropy over all voxels, nats.
+    pub predicted_nats: f64,
+    /// The same of the belief as it is, as if nothing changed.
+    pub unchanged_nats: f64,
 }
 
 /// The pushes of one decision.
@@ -170,8 +179,11 @@ pub fn probe_step(episode: &Episode, logged: &StepRecord, carried_out: &(dyn Fn(
     let known = episode.counterfactual()?;
     let (at, motions): (Vec<usize>, Vec<PhasedMotion>) = motions(episode, logged).into_iter().unzip();
     let truths = known.of_each(&motions, carried_out);
-    let pushes: Vec<ProbedPush> =
-        at.iter().zip(truths).map(|(&at, truth)| probed(episode, at, &decision.candidates[at], truth)).collect();
+    let chosen: Vec<Manipulation> = at.iter().map(|&at| decision.candidates[at].manipulation).collect();
+    let nats = predicted::nats(episode, &chosen, &motions, &truths);
+    let pushes: Vec<ProbedPush> = (at.iter().zip(truths).zip(nats))
+        .map(|((&at, truth), nats)| probed(episode, at, &decision.candidates[at], truth, nats))
+        .collect();
     let position = |candidate: Option<usize>| pushes.iter().position(|push| Some(push.candidate) == candidate);
     let made = match logged.action {
         Action::Look { .. } => None,
@@ -217,7 +229,13 @@ fn motions(episode: &Episode, logged: &StepRecord) -> Vec<(usize, PhasedMotion)>
     feasible(logged).filter_map(of).collect()
 }
 
-fn probed(episode: &Episode, candidate: usize, promised: &CandidateRecord, truth: PushTruth) -> ProbedPush {
+fn probed(
+    episode: &Episode,
+    candidate: usize,
+    promised: &CandidateRecord,
+    truth: PushTruth,
+    [predicted_nats, unchanged_nats]: [f64; 2],
+) -> ProbedPush {
     let names = |ids: &[crate::scene::ObjectId]| ids.iter().map(|id| episode.name(*id)).collect();
     let opened_voxels = truth.opened.len();
     ProbedPush {
@@ -234,6 +252,9 @@ fn probed(episode: &Episode, candidate: usize, promised: &CandidateRecord, truth
         dropped: names(&truth.dropped),
         toppled: names(&truth.toppled),
         displacement_m: truth.displacement_m,
+        grip: truth.grip,
+        predicted_nats,
+        unchanged_nats,
     }
 }
 

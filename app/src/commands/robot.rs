@@ -1,24 +1,20 @@
 //! `nudge robot`: checks an arm and shows what it reaches.
 
+mod skills;
+
 use super::{print, to_json, warn};
 use crate::picture;
 use nudge_core::Error;
 use nudge_core::arm::{Arm, ArmTool, JointKind, Reach};
-use nudge_core::belief::{CLASSICAL, Classical};
 use nudge_core::camera::{View, ViewArray};
-use nudge_core::episode::{Episode, EpisodeConfig};
-use nudge_core::plan::{PlannerSettings, PolicyKind};
 use nudge_core::scene::{Catalog, RobotFile, RobotPlacement, Scene, Shelf};
+use nudge_core::skill::PickPlace;
 use nudge_core::skill::push::TOOL_HEIGHT_M;
-use nudge_core::skill::{SkillKind, SkillSet};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::sync::Arc;
 
-/// After so many looks, with the classical belief, it is counted what each skill can do in a scene.
-const LOOKS: usize = 6;
 /// Distance of the places that are tried in the shelf, metres.
 const STEP_M: f32 = 0.02;
 
@@ -43,6 +39,9 @@ struct CheckArgs {
     /// can do there [default: the standard shelf and place]
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
+    /// Where picks set objects down, of which it is counted what can be taken
+    #[arg(long, default_value = "shelf", value_name = "shelf|tray", requires = "scene")]
+    place: PickPlace,
     /// Its link at the finger tip, z ahead, x along the gripper's broad side [default: `tool` or another usual name]
     #[arg(long, value_name = "LINK")]
     tool: Option<String>,
@@ -81,17 +80,7 @@ struct Report {
     reach: ReachReport,
     views: Vec<ViewsReport>,
     /// What each skill can do in the scene; empty without one.
-    skills: Vec<SkillReport>,
-}
-
-/// The candidates of a skill, and what stops the others.
-#[derive(Serialize)]
-struct SkillReport {
-    skill: &'static str,
-    drawn: usize,
-    feasible: usize,
-    /// Number of rejected candidates, by reason.
-    rejected: BTreeMap<String, usize>,
+    skills: Vec<skills::SkillReport>,
 }
 
 #[derive(Serialize)]
@@ -150,7 +139,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut report = report(args, &placement, &tool, &reach, &arrays, &views);
     if let (Some(scene), Some(_)) = (scene, tool.ready) {
-        report.skills = skills(Scene { robot: placement, ..scene })?;
+        report.skills = skills::of(Scene { robot: placement, ..scene }, args.place)?;
     }
     if let (Some(out), Some(array), Some(views)) = (&args.out, arrays.first(), views.first()) {
         let joints = tool.ready.unwrap_or_else(|| nudge_core::arm::Joints::zero(tool.arm.joints.len()));
@@ -214,36 +203,6 @@ fn report(
     }
 }
 
-/// What each skill can do in a scene after some looks.
-fn skills(scene: Scene) -> nudge_core::Result<Vec<SkillReport>> {
-    let planner = PlannerSettings { skills: SkillSet::of(SkillKind::ALL), ..PlannerSettings::of_belief(CLASSICAL) };
-    let config = EpisodeConfig {
-        policy: PolicyKind::MemNoPush,
-        belief: CLASSICAL.to_owned(),
-        seed: 0,
-        budget: LOOKS + 1,
-        views: "standard300".to_owned(),
-        planner,
-        noise: None,
-    };
-    let mut episode = Episode::new(scene, Arc::new(Catalog::standard()), config, Arc::new(Classical))?;
-    for _ in 0..LOOKS {
-        let decision = episode.decide();
-        episode.act(decision)?;
-    }
-    let drawn = episode.draw_candidates();
-    let of = |kind: &SkillKind| {
-        let mine = || drawn.iter().filter(move |candidate| candidate.manipulation.kind() == *kind);
-        let mut rejected = BTreeMap::new();
-        for rejection in mine().filter_map(|candidate| candidate.rejection.as_ref()) {
-            *rejected.entry(rejection.kind_words(*kind)).or_default() += 1;
-        }
-        let feasible = mine().filter(|candidate| candidate.rejection.is_none()).count();
-        SkillReport { skill: kind.name(), drawn: mine().count(), feasible, rejected }
-    };
-    Ok(SkillKind::ALL.iter().map(of).collect())
-}
-
 fn table(report: &Report) -> String {
     let [x, y, z] = report.base;
     let inverse = if report.closed_form { "closed-form inverse" } else { "numeric inverse" };
@@ -283,14 +242,6 @@ fn table(report: &Report) -> String {
             let _ = writeln!(text, "             {count} not: {words}");
         }
     }
-    for skill in &report.skills {
-        let SkillReport { skill, drawn, feasible, rejected } = skill;
-        let _ = writeln!(text, "  {skill:<10} {feasible} of {drawn} drawn are feasible after {LOOKS} looks");
-        let mut rejected: Vec<_> = rejected.iter().collect();
-        rejected.sort_by_key(|(_, count)| std::cmp::Reverse(**count));
-        for (words, count) in rejected {
-            let _ = writeln!(text, "             {count} not: {words}");
-        }
-    }
+    report.skills.iter().for_each(|skill| text += &skill.table());
     text
 }

@@ -21,7 +21,8 @@ pub const CARRY_M_S: f64 = 0.15;
 pub enum PhaseKind {
     /// To where the tool touches; nothing is to be touched on the way.
     Approach,
-    /// While the tool touches what it is to move.
+    /// While the tool touches what it is to move. Before a [`Carry`](Self::Carry) the arm feels its way: it stops as soon as
+    /// the cup seals, and is drawn back to where the phase began.
     Contact,
     /// While the cup holds what it has taken: suction is on from its beginning to its end.
     Carry,
@@ -151,6 +152,11 @@ impl PhasedMotion {
     pub fn whole(&self, arm: &Arm) -> Motion {
         let outward = self.outward().fold(Motion::default(), |whole, phase| whole.then(&phase.motion));
         outward.then(&self.way_back(arm))
+    }
+
+    /// Whether something is to be held on the way.
+    pub fn carries(&self) -> bool {
+        self.of_kind(PhaseKind::Carry).next().is_some()
     }
 
     /// From when to when something is in hand, seconds since the motion began; `None` where nothing is carried.

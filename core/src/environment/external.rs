@@ -8,11 +8,11 @@ mod program;
 mod wire;
 
 use super::Environment;
-use crate::arm::{Arm, Joints, PhasedMotion};
+use crate::arm::{Arm, Joints, PhaseKind, PhasedMotion};
 use crate::camera::{Intrinsics, Pinhole, Sensed, View, ViewArray, ViewId, pose_from_quaternion};
 use crate::recording::frame_of_files;
 use crate::scene::Scene;
-use crate::world::{ManipulationOutcome, TruthMap};
+use crate::world::{Grip, GripEnd, ManipulationOutcome, TruthMap};
 use crate::{Error, Pose, Result};
 use program::Program;
 use std::path::{Component, Path, PathBuf};
@@ -158,19 +158,33 @@ fn outcome(arm: &Arm, motion: &PhasedMotion, moved: &MovedAnswer) -> std::result
     if passed > outward.len() || passed == 0 {
         return Err(format!("passed {passed} of the {} stops before the retreat", outward.len()));
     }
-    let in_contact = |phase: &&crate::arm::Phase| phase.kind != crate::arm::PhaseKind::Approach;
+    let in_contact = |phase: &&crate::arm::Phase| phase.kind != PhaseKind::Approach;
     let before: usize = motion.outward().filter(|phase| !in_contact(phase)).map(|phase| phase.motion.stops.len()).sum();
     let tip = |joints: &Joints| arm.world_from_tool(joints).translation.vector;
     let way_m = match (outward.get(before), outward[..passed].last()) {
         (Some(first), Some(last)) if passed > before => (tip(last) - tip(first)).norm() as f32,
         _ => 0.0,
     };
+    let stalled = moved.stalled.unwrap_or(passed < outward.len());
     let there: f64 = motion.outward().map(|phase| phase.motion.duration_s()).sum();
     Ok(ManipulationOutcome {
-        stalled: moved.stalled.unwrap_or(passed < outward.len()),
+        stalled,
+        grip: motion
+            .carries()
+            .then(|| Grip { object: None, end: moved.grip.unwrap_or_else(|| likely_end(motion, stalled)) }),
         way_m,
         arm_s: (there + motion.way_back(arm).duration_s()) as f32,
         passed: outward[..passed].to_vec(),
         ..ManipulationOutcome::default()
     })
+}
+
+/// How holding an object ended, where the program does not say.
+fn likely_end(motion: &PhasedMotion, stalled: bool) -> GripEnd {
+    let is_stowed = motion.outward().any(|phase| phase.kind == PhaseKind::Stow);
+    match (stalled, is_stowed) {
+        (true, _) => GripEnd::NoSeal,
+        (false, true) => GripEnd::Stowed,
+        (false, false) => GripEnd::SetDown,
+    }
 }

@@ -186,6 +186,8 @@ impl Table {
             dropped: Vec::new(),
             toppled: Vec::new(),
             shown: Vec::new(),
+            grip: None,
+            occupied: VoxelSet::empty(&self.belief.grid),
         }
     }
 

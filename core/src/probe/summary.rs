@@ -59,6 +59,10 @@ pub struct StepSummary {
     pub toppled_share: f64,
     /// Mean displacement, metres.
     pub displacement_m: f64,
+    /// Mean cross-entropy of what is occupied after a push by its prediction, nats.
+    pub predicted_nats: f64,
+    /// The same by the belief as it is, as if nothing changed, nats.
+    pub unchanged_nats: f64,
 }
 
 impl StepProbe {
@@ -68,7 +72,7 @@ impl StepProbe {
             let count = self.pushes.iter().filter(|push| is_one(push)).count();
             count as f64 / self.pushes.len().max(1) as f64
         };
-        let displacements: Vec<f64> = self.pushes.iter().map(|push| push.displacement_m).collect();
+        let over = |value: fn(&ProbedPush) -> f64| mean(&self.pushes.iter().map(value).collect::<Vec<_>>());
         StepSummary {
             pushes: self.pushes.len() as f64,
             hidden: self.hidden.len() as f64,
@@ -78,7 +82,9 @@ impl StepProbe {
             jammed_share: share(|push| push.jammed),
             dropped_share: share(|push| !push.dropped.is_empty()),
             toppled_share: share(|push| !push.toppled.is_empty()),
-            displacement_m: mean(&displacements),
+            displacement_m: over(|push| push.displacement_m),
+            predicted_nats: over(|push| push.predicted_nats),
+            unchanged_nats: over(|push| push.unchanged_nats),
         }
     }
 
@@ -113,6 +119,8 @@ impl StepSummary {
             dropped_share: over(|s| s.dropped_share),
             toppled_share: over(|s| s.toppled_share),
             displacement_m: over(|s| s.displacement_m),
+            predicted_nats: over(|s| s.predicted_nats),
+            unchanged_nats: over(|s| s.unchanged_nats),
         }
     }
 }

@@ -210,6 +210,9 @@ fn made_up(rows: &[(Option<f32>, usize, usize, f64)], chosen: Option<usize>) -> 
         dropped: Vec::new(),
         toppled: Vec::new(),
         displacement_m: 0.1 * at as f64,
+        grip: None,
+        predicted_nats: 0.0,
+        unchanged_nats: 0.0,
     };
     StepProbe {
         step: 7,

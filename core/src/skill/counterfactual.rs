@@ -19,7 +19,7 @@ use crate::gain::{RayDensity, TrueReach};
 use crate::grid::{Grid, VoxelSet};
 use crate::scene::{Body, ObjectId};
 use crate::solid::Bounds;
-use crate::world::{TruthMap, World};
+use crate::world::{GripEnd, TruthMap, World};
 use crate::{Pose, Vector};
 use rayon::prelude::*;
 
@@ -33,7 +33,8 @@ const TOPPLED_COSINE: f32 = std::f32::consts::FRAC_1_SQRT_2;
 pub struct PushTruth {
     /// Objects that a view shows after it and none showed before, in the scene's order.
     pub won: Vec<ObjectId>,
-    /// Objects that a view showed before it and none shows after, in the scene's order; dropped ones too, hidden or not.
+    /// Objects that a view showed before it and none shows after, in the scene's order; dropped ones too, hidden or not. What
+    /// was laid down beside the robot is known, and not lost.
     pub lost: Vec<ObjectId>,
     /// The space that it opens.
     pub opened: VoxelSet,
@@ -50,6 +51,10 @@ pub struct PushTruth {
     /// How many voxels of each object a view reaches after it, of every fourth view of the array, in the scene's order; 0 of
     /// dropped ones.
     pub shown: Vec<u32>,
+    /// How holding an object ended, of what was to hold one.
+    pub grip: Option<GripEnd>,
+    /// Voxels that are occupied after it.
+    pub occupied: VoxelSet,
 }
 
 impl PushTruth {
@@ -85,6 +90,8 @@ pub struct Counterfactual<'a> {
     shown: Vec<u32>,
     /// Voxels that no push opens: seen, or inside an object.
     known: VoxelSet,
+    /// Voxels that are occupied now.
+    occupied: VoxelSet,
 }
 
 impl<'a> Counterfactual<'a> {
@@ -93,11 +100,12 @@ impl<'a> Counterfactual<'a> {
         let (grid, bodies) = (world.shelf().grid(), world.bodies());
         let truth = TruthMap::of(&grid, &bodies);
         let mut known = seen.clone();
-        truth.occupancy.iter().enumerate().filter(|(_, filled)| **filled != 0).for_each(|(at, _)| known.insert(at));
+        let occupied = occupied(&grid, &truth);
+        occupied.iter().for_each(|at| known.insert(at));
         let watch = HiddenWatch::new(world.shelf(), &bodies, views);
         let reach = TrueReach::new(&grid, &truth, views, REACH_DENSITY);
         let shown = in_order(&bodies, &reach.shown(&TruthMap::owners(&grid, &bodies), ids(&bodies)));
-        Self { hidden: watch.hidden(), watch, reach, shown, world, arm, grid, bodies, known }
+        Self { hidden: watch.hidden(), watch, reach, shown, world, arm, grid, bodies, known, occupied }
     }
 
     /// The bodies as they stand now, dropped ones left out.
@@ -130,6 +138,8 @@ impl<'a> Counterfactual<'a> {
             dropped: outcome.dropped,
             toppled: Vec::new(),
             shown: self.shown.clone(),
+            grip: outcome.grip.map(|grip| grip.end),
+            occupied: self.occupied.clone(),
         };
         let now = |id: ObjectId| after.iter().find(|body| body.id == id);
         let stays = |body: &Body| now(body.id).is_some_and(|now| now.world_from_body == body.world_from_body);
@@ -140,10 +150,10 @@ impl<'a> Counterfactual<'a> {
         for body in &self.bodies {
             let was_hidden = self.hidden.contains(&body.id);
             match now(body.id) {
-                None => truth.lost.push(body.id),
+                None if truth.dropped.contains(&body.id) => truth.lost.push(body.id),
                 Some(_) if was_hidden && !hidden.contains(&body.id) => truth.won.push(body.id),
                 Some(_) if !was_hidden && hidden.contains(&body.id) => truth.lost.push(body.id),
-                Some(_) => {}
+                _ => {}
             }
             if now(body.id).is_some_and(|now| stands(&body.world_from_body) && !stands(&now.world_from_body)) {
                 truth.toppled.push(body.id);
@@ -153,7 +163,9 @@ impl<'a> Counterfactual<'a> {
             !self.bodies.iter().any(|body| body.id == now.id && body.world_from_body == now.world_from_body)
         });
         let filled: Vec<Bounds> = moved.map(|body| body.solid.bounds_at(&body.world_from_body)).collect();
-        let reach = self.reach.after(&TruthMap::of(&self.grid, &after), &filled);
+        let map = TruthMap::of(&self.grid, &after);
+        let reach = self.reach.after(&map, &filled);
+        truth.occupied = occupied(&self.grid, &map);
         truth.shown = in_order(&self.bodies, &reach.shown(&TruthMap::owners(&self.grid, &after), ids(&self.bodies)));
         truth.opened = reach.opened;
         truth.opened.subtract(&self.known);
@@ -170,6 +182,13 @@ impl<'a> Counterfactual<'a> {
         };
         motions.par_iter().with_max_len(1).map(carried_out).collect()
     }
+}
+
+/// The voxels that are occupied.
+fn occupied(grid: &Grid, truth: &TruthMap) -> VoxelSet {
+    let mut occupied = VoxelSet::empty(grid);
+    truth.occupancy.iter().enumerate().filter(|(_, filled)| **filled != 0).for_each(|(at, _)| occupied.insert(at));
+    occupied
 }
 
 /// One more than the largest id of some bodies.

@@ -151,8 +151,8 @@ impl Skill for Pick {
     }
 
     fn is_done_by(&self, motion: &PhasedMotion, arm: &Arm, ready: &Joints) -> bool {
-        let from = self.touch() + self.ahead() * carry::PRESS_M;
-        let to = self.place.map(|[x, y]| from + Vector::new(x, y, carry::GAP_M));
+        let from = self.touch() - self.ahead() * carry::FEEL_M;
+        let to = self.place.map(|[x, y]| self.touch() + Vector::new(x, y, carry::GAP_M));
         motion.leads_in(PhaseKind::Carry, arm, ready, from, to)
     }
 

@@ -255,3 +255,59 @@ fn nothing_that_is_not_there_or_too_heavy_is_held() {
     );
     assert_eq!(of(vec![body(0, [0.06, 0.05, 0.12], 0.0, 0.15, 0.0, 4.0)]), Some(GripEnd::CameOff), "4 kg are too much");
 }
+
+#[test]
+fn a_front_that_stands_a_centimetre_from_where_it_is_believed_is_felt_and_taken() {
+    let arm = arm();
+    let size = [0.06, 0.05, 0.12];
+    let world = settled(vec![body(0, size, 0.0, 0.15, 0.0, 0.4)]);
+    let (_, motion) = pick_at(&picks(&knowing(&world.bodies()), &arm, PickPlace::Tray), 0.0);
+    for off in [-0.012, 0.012] {
+        let outcome = settled(vec![body(0, size, 0.0, 0.15 + off, 0.0, 0.4)]).execute(&arm.arm, &motion);
+        assert_eq!(outcome.grip.map(|grip| grip.end), Some(GripEnd::Stowed), "{off} m off");
+    }
+    // It is not felt for farther than that, and what is too narrow for the rim is not pushed away while the cup feels for it.
+    let far = settled(vec![body(0, size, 0.0, 0.15 + 0.025, 0.0, 0.4)]).execute(&arm.arm, &motion);
+    assert_eq!(far.grip.map(|grip| grip.end), Some(GripEnd::NoSeal));
+    let edge = settled(vec![body(0, [0.03, 0.05, 0.12], 0.0, 0.15, 0.0, 0.4)]).execute(&arm.arm, &motion);
+    let moved_m: f32 = edge.displacement_m.iter().sum();
+    assert!(edge.grip.is_some_and(|grip| grip.end == GripEnd::NoSeal) && moved_m < 0.002, "{moved_m} m");
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig { cases: 12, ..Default::default() })]
+
+    /// Whatever stands there: nothing that is held or let go passes through anything, what is set down stands on the board,
+    /// and no object is lost or made.
+    #[test]
+    fn picks_of_any_shelf_keep_every_object_whole_and_out_of_the_others(
+        stands in proptest::collection::vec((0.04_f32..0.12, 0.04_f32..0.08, 0.08_f32..0.2, -45.0_f32..45.0, 0.2_f32..0.9), 2..6),
+        to_tray in proptest::bool::ANY,
+    ) {
+        let arm = arm();
+        let standing = |(at, (width, depth, height, yaw, mass)): (usize, &(f32, f32, f32, f32, f32))| {
+            let x = -0.3 + 0.15 * (at % 5) as f32;
+            body(at as u16, [*width, *depth, *height], x, 0.12 + 0.04 * (at % 2) as f32, 0.3 * yaw, *mass)
+        };
+        let world = settled(stands.iter().enumerate().map(standing).collect());
+        let place = if to_tray { PickPlace::Tray } else { PickPlace::Shelf };
+        for candidate in picks(&knowing(&world.bodies()), &arm, place).iter().filter(|c| c.motion.is_some()).take(2) {
+            let mut after = world.clone();
+            let outcome = after.execute(&arm.arm, candidate.motion.as_ref().expect("feasible"));
+            proptest::prop_assert!(after.deepest_overlap_m() < 0.004, "{} m", after.deepest_overlap_m());
+            let states = after.standing();
+            proptest::prop_assert_eq!(states.len(), stands.len());
+            let gone = states.iter().filter(|state| state.stowed || state.dropped).count();
+            proptest::prop_assert_eq!(after.bodies().len() + gone, stands.len());
+            let mass = |world: &World| world.bodies().iter().map(|body| body.mass_kg).sum::<f32>();
+            if gone == 0 {
+                proptest::prop_assert!((mass(&after) - mass(&world)).abs() < 1e-6);
+            }
+            if let Some(Grip { object: Some(id), end: GripEnd::SetDown }) = outcome.grip {
+                let now = after.bodies().into_iter().find(|body| body.id == id).expect("still there");
+                let z = now.world_from_body.translation.z;
+                proptest::prop_assert!(z.abs() < 0.002, "it hangs or sinks: {} m", z);
+            }
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! A manipulation by the arm: its links follow the motion as kinematic bodies, and the objects that they touch are recorded.
 
-use super::physics::{BLOCKING_FORCE_N, TIME_STEP_S};
+use super::physics::{BLOCKING_FORCE_N, TIME_STEP_S, Touch};
 use super::{ManipulationOutcome, World};
 use crate::arm::{Arm, Joints, Motion, PhaseKind, PhasedMotion};
 use crate::scene::{Body, ObjectId};
@@ -45,12 +45,26 @@ impl GripEnd {
     }
 }
 
+impl std::fmt::Display for GripEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::NoSeal => "no seal",
+            Self::CameOff => "came off",
+            Self::SetDown => "set down",
+            Self::Stowed => "laid down beside the robot",
+        })
+    }
+}
+
 /// How a motion ended.
 struct Ride {
     /// The last configuration.
     joints: Joints,
-    /// When the arm stopped, since it was blocked or lost what it held, seconds since the motion began.
-    blocked_s: Option<f64>,
+    /// When the arm stopped, since it was blocked, lost what it held or felt what it was to touch, seconds since the motion
+    /// began.
+    stopped_s: Option<f64>,
+    /// What the cup of an arm that feels met when it stopped.
+    touch: Option<Touch>,
 }
 
 impl World {
@@ -77,22 +91,28 @@ impl World {
                 self.stow();
                 grip = grip.map(|grip| Grip { end: GripEnd::Stowed, ..grip });
             }
-            if phase.kind == PhaseKind::Carry && grip.is_none() {
-                let sealed = self.physics.sealed_on(arm, &last);
+            let feels = phase.kind == PhaseKind::Contact && motion.carries();
+            let mut ride = self.ride(arm, &phase.motion, feels, &mut notes);
+            back.extend(before_time(&phase.motion, ride.stopped_s));
+            if feels {
+                let sealed = if let Some(Touch::Sealed(at)) = ride.touch { Some(at) } else { None };
                 let object = sealed.and_then(|at| self.bodies.get(at)).map(|body| body.id);
                 grip = Some(Grip { object, end: sealed.map_or(GripEnd::NoSeal, |_| GripEnd::SetDown) });
-                match sealed {
-                    Some(at) => self.physics.hold(at),
-                    None => break,
-                }
+                last = ride.joints;
+                let Some(at) = sealed else { break };
+                // What it holds is drawn back to where it began to feel: the way from there is planned.
+                self.physics.hold(at);
+                let mut felt: Vec<Joints> = before_time(&phase.motion, ride.stopped_s);
+                felt.push(last);
+                felt.reverse();
+                ride = self.ride(arm, &Motion::along(arm, &felt, crate::arm::CARRY_M_S), false, &mut notes);
+                back.extend(felt);
             }
-            let ride = self.ride(arm, &phase.motion, &mut notes);
             last = ride.joints;
-            back.extend(before_time(&phase.motion, ride.blocked_s));
             if matches!(phase.kind, PhaseKind::Contact | PhaseKind::Carry) {
                 way_m += (tip(&last) - tip(&start)).norm() as f32;
             }
-            if ride.blocked_s.is_some() {
+            if ride.stopped_s.is_some() {
                 match &mut grip {
                     Some(grip) => grip.end = GripEnd::CameOff,
                     None => stalled = true,
@@ -108,7 +128,7 @@ impl World {
         let planned = motion.retreat().filter(|_| is_done);
         let way_back = planned.unwrap_or_else(|| Motion::along(arm, &back, crate::arm::WAY_BACK_M_S));
         // An arm that cannot even go back is taken away where it is: a real one would give way.
-        self.ride(arm, &way_back, &mut notes);
+        self.ride(arm, &way_back, false, &mut notes);
         self.physics.remove_arm();
         self.come_to_rest();
         self.read_back();
@@ -136,8 +156,9 @@ impl World {
         }
     }
 
-    /// Moves the arm along a motion; stops when it is blocked.
-    fn ride(&mut self, arm: &Arm, motion: &Motion, notes: &mut Notes) -> Ride {
+    /// Moves the arm along a motion; stops when it is blocked, and an arm that feels as soon as its cup seals or its bellows
+    /// gives way no farther.
+    fn ride(&mut self, arm: &Arm, motion: &Motion, feels: bool, notes: &mut Notes) -> Ride {
         let steps = (motion.duration_s() / f64::from(TIME_STEP_S)).ceil() as usize;
         let mut joints = motion.at(0.0).unwrap_or_else(|| Joints::zero(arm.joints.len()));
         for step in 1..=steps {
@@ -146,12 +167,13 @@ impl World {
             let blocked = self.physics.step_arm(arm, &joints) || self.physics.comes_off(arm, &joints);
             notes.steps += 1;
             self.take_notes(notes);
-            if blocked && step < steps {
-                return Ride { joints, blocked_s: Some(at_s) };
+            let touch = feels.then(|| self.physics.touch(arm, &joints)).filter(|touch| *touch != Touch::Open);
+            if touch.is_some() || (blocked && step < steps) {
+                return Ride { joints, stopped_s: Some(at_s), touch };
             }
             self.note_drops();
         }
-        Ride { joints, blocked_s: None }
+        Ride { joints, stopped_s: None, touch: None }
     }
 
     fn take_notes(&self, notes: &mut Notes) {
@@ -185,8 +207,8 @@ struct Notes {
     steps: u32,
 }
 
-/// The stops of a motion that were passed before it was blocked.
-fn before_time(motion: &Motion, blocked_s: Option<f64>) -> Vec<Joints> {
-    let until = blocked_s.unwrap_or(f64::INFINITY);
+/// The stops of a motion that were passed before it stopped.
+fn before_time(motion: &Motion, stopped_s: Option<f64>) -> Vec<Joints> {
+    let until = stopped_s.unwrap_or(f64::INFINITY);
     motion.stops.iter().filter(|stop| stop.at_s < until).map(|stop| stop.joints).collect()
 }

@@ -5,6 +5,7 @@
 
 mod suction;
 
+pub(super) use suction::Touch;
 pub use suction::{BEND_NM, LIP_M, PULL_N, STROKE_M};
 
 use super::hull::Hull;

@@ -128,7 +128,7 @@ fn a_push_is_previewed_done_and_reviewed() {
     for map in ["Map of the push: now", "Map of the push: predicted", "Map of the push: change"] {
         assert!(window.sees(map), "{map}");
     }
-    window.click("Push this");
+    window.click("Do this");
     assert_eq!(window.steps(), 5, "{:?}", window.toasts());
     assert_eq!(window.session().record.steps[4].action, Action::Manipulate(decision.candidates[feasible].manipulation));
     // The arm can be moved along what it did.

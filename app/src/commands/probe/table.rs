@@ -43,7 +43,7 @@ pub(super) fn pushes(probed: &Probed, step: &ProbedStep) -> String {
     if probe.made.is_some() {
         text += "; ! the one that was made";
     }
-    let _ = write!(text, "\n\n{}{}", headings(), line(&format!("step {}", probe.step), summary));
+    let _ = write!(text, "\n\n{}{}{}", headings(), line(&format!("step {}", probe.step), summary), predicted(summary));
     text
 }
 
@@ -65,6 +65,9 @@ fn row(mark: &str, probed: &ProbedPush) -> String {
     remark("topples", &probed.toppled);
     if probed.jammed {
         remarks.push("jams".to_owned());
+    }
+    if let Some(grip) = probed.grip {
+        remarks.push(grip.to_string());
     }
     let came = format!("{:.0} of {:.0}", probed.pushed_m * 1e3, done.skill().way_m() * 1e3);
     let text = format!(
@@ -110,7 +113,15 @@ pub(super) fn step(record: &EpisodeRecord, probe: &StepProbe) -> String {
 
 /// The last line: means over decisions.
 pub(super) fn mean(mean: &StepSummary, decisions: usize) -> String {
-    line(&format!("mean of {decisions} decisions"), mean)
+    line(&format!("mean of {decisions} decisions"), mean) + &predicted(mean)
+}
+
+/// How well the belief predicts what is occupied afterwards.
+fn predicted(summary: &StepSummary) -> String {
+    format!(
+        "\noccupancy afterwards, cross-entropy over all voxels: {:.0} nats as predicted, {:.0} if nothing had changed\n",
+        summary.predicted_nats, summary.unchanged_nats
+    )
 }
 
 fn line(name: &str, summary: &StepSummary) -> String {
@@ -133,7 +144,7 @@ fn line(name: &str, summary: &StepSummary) -> String {
 }
 
 /// The columns of the CSV, units in their names.
-const COLUMNS: [&str; 26] = [
+const COLUMNS: [&str; 29] = [
     "episode",
     "scene",
     "policy",
@@ -160,6 +171,9 @@ const COLUMNS: [&str; 26] = [
     "toppled",
     "displacement_m",
     "hidden_before",
+    "grip",
+    "predicted_nats",
+    "unchanged_nats",
 ];
 
 /// Every push as CSV (RFC 4180), one a line, of each decision the planner's best first; of objects the names, with spaces between them.
@@ -209,6 +223,9 @@ fn fields(probed: &Probed, probe: &StepProbe, at: usize, push: &ProbedPush) -> [
         push.toppled.join(" "),
         push.displacement_m.to_string(),
         probe.hidden.join(" "),
+        push.grip.map_or(String::new(), |grip| grip.to_string()),
+        push.predicted_nats.to_string(),
+        push.unchanged_nats.to_string(),
     ]
 }
 

@@ -232,18 +232,18 @@ pub(super) fn apply_push(table: table::Touched, decision: &Decision, touched: &m
     }
 }
 
-/// The button that does the chosen push.
+/// The button that does the chosen candidate.
 pub fn push_button(ui: &mut Ui, session: &Session, model: &Model, decision: &Decision, ask: &mut Vec<Command>) {
     let chosen = model.candidate.and_then(|at| Some((at, decision.candidates.get(at)?)));
-    let title = chosen.map_or("Push this".to_owned(), |(at, _)| format!("Push this: {at}"));
+    let title = chosen.map_or("Do this".to_owned(), |(at, _)| format!("Do this: {at}"));
     let dropped = session.record.steps.iter().any(|step| !step.dropped().is_empty());
     let missing = match chosen {
-        _ if dropped => Some("An object was dropped: this episode pushes no more"),
-        None => Some("Choose a push first"),
-        Some((_, candidate)) if candidate.rejection.is_some() => Some("This push was rejected"),
+        _ if dropped => Some("An object was dropped: this episode moves nothing more"),
+        None => Some("Choose a candidate first"),
+        Some((_, candidate)) if candidate.rejection.is_some() => Some("This candidate was rejected"),
         Some(_) => None,
     };
-    if do_instead(ui, session, model.cursor, "Push this", &title, missing)
+    if do_instead(ui, session, model.cursor, "Do this", &title, missing)
         && let Some((_, candidate)) = chosen
     {
         ask.push(Command::DoInstead(Action::Manipulate(candidate.manipulation)));

@@ -3,6 +3,7 @@
 use crate::arm::PhasedMotion;
 use crate::camera::Pinhole;
 use crate::recording::opencv_pinhole;
+use crate::world::GripEnd;
 use serde::{Deserialize, Serialize};
 
 /// A request, one line.
@@ -159,4 +160,5 @@ pub(super) struct FrameAnswer {
 pub(super) struct MovedAnswer {
     pub(super) passed: Option<usize>,
     pub(super) stalled: Option<bool>,
+    pub(super) grip: Option<GripEnd>,
 }

@@ -9,15 +9,15 @@ use crate::belief::Patch;
 use crate::rng::ChaCha8Rng;
 use crate::skill::clearance::{Approach, ArmClearance, QUERY};
 use crate::skill::{Rejection, Stage};
-use crate::world::{LIP_M, STROKE_M};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::FRAC_PI_2;
 
 pub use super::room::LIFT_M;
 
-/// How far the cup is pressed on beyond the middle of the front, metres: midway between where its lip just meets it and where
-/// the bellows gives way no farther.
-pub const PRESS_M: f32 = 0.5 * (STROKE_M - LIP_M);
+/// How far before and behind where a front is expected the cup feels for it, metres: three voxels of the standard grid.
+pub const FEEL_M: f32 = 0.015;
+/// Speed of the cup while it feels, metres per second: a vacuum sensor takes some milliseconds.
+const FEEL_M_S: f64 = 0.05;
 /// How far above the board an object is let go, metres: what is lowered farther would be pressed on the board.
 pub const GAP_M: f32 = 0.001;
 /// How far the cup goes along its own axis at the end of its way in, metres.
@@ -80,35 +80,33 @@ fn motion_turned(
     if arm.cup.is_none() {
         return Err(Rejection::NoCup);
     }
-    let press = (pick.touch() + pick.ahead() * PRESS_M).map(f64::from);
-    let touch = turned(&level_tool(&press, pick.yaw_rad()), turn_deg);
+    let feel = pick.ahead().map(f64::from) * f64::from(FEEL_M);
+    let before = pick.touch().map(f64::from) - feel;
+    let touch = turned(&level_tool(&before, pick.yaw_rad()), turn_deg);
     let up = f64::from(LIFT_M);
-    let approach = Approach {
-        poses: &[touch],
-        travel: Vector3::new(0.0, 0.0, up),
-        lift_m: ALONG_AXIS_M,
-        touches: Some(target),
-        target,
-    };
-    let reached = clearance.motion(&approach, rng)?;
-    let way_in = reached.phases.into_iter().find(|phase| phase.kind == PhaseKind::Approach).ok_or(Rejection::NoWay)?;
-    let start = way_in.motion.path().next_back().ok_or(Rejection::NoWay)?;
+    let approach =
+        Approach { poses: &[touch], travel: 2.0 * feel, lift_m: ALONG_AXIS_M, touches: Some(target), target };
+    let mut phases = clearance.motion(&approach, rng)?.phases;
+    let felt = phases.pop().ok_or(Rejection::NoWay)?.motion;
+    let start = felt.at(0.0).ok_or(Rejection::NoWay)?;
+    let felt: Vec<Joints> = felt.path().collect();
+    phases.push(Phase::closed(PhaseKind::Contact, Motion::along(arm, &felt, FEEL_M_S)));
     let space = clearance.space().pushing();
     let mut carrying = Carrying { clearance, space, target, at: start, way: Motion::default() };
     // Out until the object's back is before the front edge.
     let grid = clearance.grid();
     let back = target.cells().iter().map(|cell| cell % grid.dims[1]).max().unwrap_or(0);
-    let out = f64::from((back + 1) as f32 * grid.voxel_m + grid.origin[1]) + OUT_M;
+    let out = f64::from((back + 1) as f32 * grid.voxel_m + grid.origin[1]) + OUT_M - feel.y;
     carrying.go(Vector3::new(0.0, 0.0, up))?;
     carrying.go(Vector3::new(0.0, -out, 0.0))?;
-    let mut phases = vec![way_in];
     match pick.place {
         Some([dx, dy]) => {
             let [dx, dy] = [dx, dy].map(f64::from);
-            carrying.go(Vector3::new(dx, 0.0, 0.0))?;
-            carrying.go(Vector3::new(0.0, out + dy, 0.0))?;
+            let inwards = out + feel.y + dy;
+            carrying.go(Vector3::new(feel.x + dx, 0.0, 0.0))?;
+            carrying.go(Vector3::new(0.0, inwards, 0.0))?;
             carrying.go(Vector3::new(0.0, 0.0, -(up - f64::from(GAP_M))))?;
-            let back = carrying.back(&ready, out + dy, rng)?;
+            let back = carrying.back(&ready, inwards, rng)?;
             phases.push(Phase::closed(PhaseKind::Carry, carrying.way));
             phases.push(Phase::closed(PhaseKind::Retreat, back));
         }

@@ -36,25 +36,36 @@ pub(super) struct Held {
     loaded_steps: u32,
 }
 
+/// What the cup of an arm meets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::world) enum Touch {
+    /// Some of its rim meets nothing, or another object than the rest: no vacuum.
+    Open,
+    /// All of its rim meets the object of this number within the bellows' stroke: the vacuum sensor tells.
+    Sealed(usize),
+    /// Somewhere the bellows gives way no farther: the arm feels it.
+    Pressed,
+}
+
 impl Physics {
-    /// The object that the cup of an arm at `joints` seals on: all of its rim meets that one, within the bellows' stroke.
-    pub(in crate::world) fn sealed_on(&self, arm: &Arm, joints: &Joints) -> Option<usize> {
-        let cup = arm.cup?;
+    /// What the cup of an arm at `joints` meets.
+    pub(in crate::world) fn touch(&self, arm: &Arm, joints: &Joints) -> Touch {
+        let Some(cup) = arm.cup else { return Touch::Open };
         let rim = pose_of(&arm.world_from_tool(joints));
         let ahead = rim.rotation * Vector::z();
-        let mut sealed = None;
-        for number in 0..RIM_POINTS {
+        let met = (0..RIM_POINTS).map(|number| {
             let (sin, cos) = (std::f32::consts::TAU * number as f32 / RIM_POINTS as f32).sin_cos();
             let radius = cup.radius_m as f32;
-            let origin = rim * Point::new(radius * cos, radius * sin, -BEHIND_M);
-            let (at, distance) = self.first_object(origin, ahead, BEHIND_M + LIP_M)?;
-            let is_deep = distance < BEHIND_M - STROKE_M;
-            if is_deep || sealed.is_some_and(|sealed| sealed != at) {
-                return None;
-            }
-            sealed = Some(at);
+            self.first_object(rim * Point::new(radius * cos, radius * sin, -BEHIND_M), ahead, BEHIND_M + LIP_M)
+        });
+        let met: Vec<Option<(usize, f32)>> = met.collect();
+        if met.iter().flatten().any(|(_, distance)| *distance < BEHIND_M - STROKE_M) {
+            return Touch::Pressed;
         }
-        sealed
+        match met[0] {
+            Some((at, _)) if met.iter().all(|met| met.is_some_and(|met| met.0 == at)) => Touch::Sealed(at),
+            _ => Touch::Open,
+        }
     }
 
     /// The first object along a ray and how far it is, metres.
@@ -181,20 +192,21 @@ mod tests {
     fn the_cup_seals_within_the_bellows_stroke_and_on_all_of_its_rim() {
         let sealed = |ahead_m, aside_m| {
             let (tool, ready, physics) = hanging(ahead_m, aside_m);
-            physics.sealed_on(&tool.arm, &ready)
+            physics.touch(&tool.arm, &ready)
         };
         for ahead_m in [-0.007, -0.004, 0.001] {
-            assert_eq!(sealed(ahead_m, 0.0), Some(0), "{ahead_m}");
+            assert_eq!(sealed(ahead_m, 0.0), Touch::Sealed(0), "{ahead_m}");
         }
-        assert_eq!(sealed(-0.010, 0.0), None, "the bellows gives way no farther");
-        assert_eq!(sealed(0.004, 0.0), None, "nothing meets the lip");
-        assert_eq!((sealed(-0.004, 0.009), sealed(-0.004, 0.012)), (Some(0), None), "over an edge");
+        assert_eq!(sealed(-0.010, 0.0), Touch::Pressed, "the bellows gives way no farther");
+        assert_eq!(sealed(0.004, 0.0), Touch::Open, "nothing meets the lip");
+        let edge = [0.009, 0.012].map(|aside_m| sealed(-0.004, aside_m));
+        assert_eq!(edge, [Touch::Sealed(0), Touch::Open], "over an edge");
     }
 
     #[test]
     fn what_hangs_on_the_cup_loads_it_with_its_weight_and_stays_where_it_is() {
         let (tool, ready, mut physics) = hanging(-0.004, 0.0);
-        let at = physics.sealed_on(&tool.arm, &ready).expect("sealed");
+        let Touch::Sealed(at) = physics.touch(&tool.arm, &ready) else { panic!("no seal") };
         physics.hold(at);
         let before = physics.pose(at);
         for _ in 0..120 {

@@ -22,7 +22,7 @@ pub enum PhaseKind {
     /// To where the tool touches; nothing is to be touched on the way.
     Approach,
     /// While the tool touches what it is to move. Before a [`Carry`](Self::Carry) the arm feels its way: it stops as soon as
-    /// the cup seals, and is drawn back to where the phase began.
+    /// the cup seals, lifts from there as the carry begins, and then goes to where that first phase of it ends.
     Contact,
     /// While the cup holds what it has taken: suction is on from its beginning to its end.
     Carry,

@@ -38,6 +38,14 @@ impl Patch {
         self.inside[cell_index]
     }
 
+    /// The part of it whose cells are asked for.
+    pub fn part(&self, is_of: impl Fn(usize) -> bool) -> Self {
+        let cells: Vec<usize> = self.cells.iter().copied().filter(|cell| is_of(*cell)).collect();
+        let mut inside = vec![false; self.inside.len()];
+        cells.iter().for_each(|cell| inside[*cell] = true);
+        Self { inside, cells }
+    }
+
     /// The cells' indices; the cell that the patch was grown from comes first.
     pub fn cells(&self) -> &[usize] {
         &self.cells
@@ -63,6 +71,11 @@ impl FloorPlan {
     /// Whether something stands on the floor cell at `cell_index`.
     pub fn stands(&self, cell_index: usize) -> bool {
         self.cells[cell_index] != Footing::Empty
+    }
+
+    /// The class of what stands on the floor cell at `cell_index`, where it is known.
+    pub fn class(&self, cell_index: usize) -> Option<ClassId> {
+        if let Footing::Labelled(class) = self.cells[cell_index] { Some(class) } else { None }
     }
 
     /// The object that stands on the floor cell at `from`.

@@ -1,12 +1,13 @@
 //! Picks: a suction cup takes an object by its front, pulls it straight out of the shelf, and sets it down elsewhere.
 //!
 //! What can be taken is read from the belief alone. The object is a patch of one class on the floor ([`FloorPlan`]) that is
-//! surely there; its front is what its cells show to the entrance. The cup touches where that front is flat enough over the
+//! surely there, or the part of one that an object of its class covers (`instances`); its front is what its cells show to the entrance. The cup touches where that front is flat enough over the
 //! cup's circle, and the object can leave where everything before its own outline is believed free (`fronts`). It is set
 //! down where the board is seen free, or beside the robot (`room`). The arm carries it lifted by a centimetre (`carry`).
 
 mod carry;
 mod fronts;
+mod instances;
 mod room;
 
 use super::sampling::draw_until;
@@ -15,7 +16,7 @@ use super::{
     Skill, Stage, Unit,
 };
 use crate::arm::{Arm, ArmTool, Joints, PhaseKind, PhasedMotion, level_tool};
-use crate::belief::{Belief, FloorPlan, Flow, Intervention, OBJECT_RADIUS_M, Patch, Stroke};
+use crate::belief::{Belief, FloorPlan, Flow, Intervention, Patch, Stroke};
 use crate::grid::{Grid, VoxelSet};
 use crate::named;
 use crate::rng::ChaCha8Rng;
@@ -100,7 +101,7 @@ impl Pick {
         let step = 0.5 * grid.voxel_m;
         let behind = (0..8).map(|i| self.touch() + self.ahead() * (step * i as f32));
         let met = behind.filter_map(|point| grid.cell_at(point)).map(|cell| grid.cell_index(cell));
-        met.into_iter().find(|cell| plan.stands(*cell)).map(|cell| plan.patch(cell, OBJECT_RADIUS_M))
+        met.into_iter().find(|cell| plan.stands(*cell)).map(|cell| instances::object(plan, grid, cell))
     }
 
     /// Its straight way of the tip: how far in the cup reaches over the object is none of it.

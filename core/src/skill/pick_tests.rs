@@ -200,8 +200,10 @@ fn what_stands_before_it_too_narrow_a_front_and_a_full_shelf_are_told_as_reasons
     let before = vec![body(0, [0.05, 0.05, 0.10], 0.0, 0.1, 0.0, 0.3), body(1, [0.3, 0.05, 0.2], 0.0, 0.25, 0.0, 0.4)];
     assert!(against(before, 2).iter().all(|reason| *reason == Rejection::NoWayOut));
     assert_eq!(against(vec![body(0, [0.03, 0.05, 0.10], 0.0, 0.1, 0.0, 0.3)], 1), [Rejection::NoFace]);
-    // Nine boxes that leave no room for one of them.
-    let wall = (0..9).map(|i| body(i, [0.08, 0.36, 0.12], -0.356 + 0.089 * f32::from(i), 0.2, 0.0, 0.4)).collect();
+    // Nine boxes that leave no room for one of them, with nine behind them.
+    let row = |y: f32| (0..9).map(move |i| body(i, [0.08, 0.16, 0.12], -0.356 + 0.089 * f32::from(i), y, 0.0, 0.4));
+    let behind = row(0.29).map(|body| Body { id: ObjectId(9 + body.id.0), class: ClassId(12), ..body });
+    let wall = row(0.10).chain(behind).collect();
     assert!(against(wall, 5).iter().all(|reason| *reason == Rejection::NoPlace), "no room");
 }
 

@@ -2,7 +2,7 @@
 
 use super::physics::{BLOCKING_FORCE_N, TIME_STEP_S, Touch};
 use super::{ManipulationOutcome, World};
-use crate::arm::{Arm, Joints, Motion, PhaseKind, PhasedMotion};
+use crate::arm::{Arm, CARRY_M_S, Joints, Motion, PhaseKind, PhasedMotion, follow_line};
 use crate::scene::{Body, ObjectId};
 use serde::{Deserialize, Serialize};
 
@@ -85,6 +85,7 @@ impl World {
         let (mut stalled, mut way_m, mut last) = (false, 0.0, first);
         let mut back: Vec<Joints> = Vec::new();
         let mut grip: Option<Grip> = None;
+        let mut holds_from: Option<Joints> = None;
         for phase in motion.outward() {
             let start = phase.motion.at(0.0).unwrap_or(last);
             if phase.kind == PhaseKind::Stow {
@@ -92,21 +93,20 @@ impl World {
                 grip = grip.map(|grip| Grip { end: GripEnd::Stowed, ..grip });
             }
             let feels = phase.kind == PhaseKind::Contact && motion.carries();
-            let mut ride = self.ride(arm, &phase.motion, feels, &mut notes);
-            back.extend(before_time(&phase.motion, ride.stopped_s));
+            // The way with what it holds begins where the cup sealed.
+            let carried = holds_from.take().map(|from| lifted_from(arm, &from, &phase.motion));
+            let phase_motion = carried.as_ref().unwrap_or(&phase.motion);
+            let ride = self.ride(arm, phase_motion, feels, &mut notes);
+            back.extend(before_time(phase_motion, ride.stopped_s));
             if feels {
                 let sealed = if let Some(Touch::Sealed(at)) = ride.touch { Some(at) } else { None };
                 let object = sealed.and_then(|at| self.bodies.get(at)).map(|body| body.id);
                 grip = Some(Grip { object, end: sealed.map_or(GripEnd::NoSeal, |_| GripEnd::SetDown) });
                 last = ride.joints;
                 let Some(at) = sealed else { break };
-                // What it holds is drawn back to where it began to feel: the way from there is planned.
                 self.physics.hold(at);
-                let mut felt: Vec<Joints> = before_time(&phase.motion, ride.stopped_s);
-                felt.push(last);
-                felt.reverse();
-                ride = self.ride(arm, &Motion::along(arm, &felt, crate::arm::CARRY_M_S), false, &mut notes);
-                back.extend(felt);
+                holds_from = Some(last);
+                continue;
             }
             last = ride.joints;
             if matches!(phase.kind, PhaseKind::Contact | PhaseKind::Carry) {
@@ -205,6 +205,19 @@ struct Notes {
     arm_in_shelf_m: f32,
     /// Time steps in which the arm moved.
     steps: u32,
+}
+
+/// The first motion with something in hand, from where the cup sealed: the same way, straight and without turning, and then to
+/// where that motion ends.
+fn lifted_from(arm: &Arm, from: &Joints, motion: &Motion) -> Motion {
+    let Some([first, last]) = motion.stops.first().zip(motion.stops.last()).map(|(a, b)| [a.joints, b.joints]) else {
+        return motion.clone();
+    };
+    let tip = |joints: &Joints| arm.world_from_tool(joints).translation.vector;
+    let lift = follow_line(arm, from, &(tip(&last) - tip(&first)), |_| true).path;
+    let lifted = lift.last().copied().unwrap_or(*from);
+    let drawn = Motion::along(arm, &[lifted, last], CARRY_M_S);
+    Motion::along(arm, &lift, CARRY_M_S).then(&drawn)
 }
 
 /// The stops of a motion that were passed before it stopped.

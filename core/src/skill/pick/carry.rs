@@ -98,6 +98,8 @@ fn motion_turned(
     let back = target.cells().iter().map(|cell| cell % grid.dims[1]).max().unwrap_or(0);
     let out = f64::from((back + 1) as f32 * grid.voxel_m + grid.origin[1]) + OUT_M - feel.y;
     carrying.go(Vector3::new(0.0, 0.0, up))?;
+    // A phase of its own: it begins where the cup has sealed.
+    phases.push(Phase::closed(PhaseKind::Carry, std::mem::take(&mut carrying.way)));
     carrying.go(Vector3::new(0.0, -out, 0.0))?;
     match pick.place {
         Some([dx, dy]) => {

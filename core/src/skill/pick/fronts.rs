@@ -1,9 +1,9 @@
 //! What can be taken according to a belief: objects that stand first behind the entrance, and where a cup fits on each.
 
 use super::room::Room;
-use super::{Pick, PickPlace};
+use super::{Pick, PickPlace, instances};
 use crate::Point;
-use crate::belief::{Belief, FloorPlan, OBJECT_RADIUS_M, Patch};
+use crate::belief::{Belief, FloorPlan, Patch};
 use crate::grid::{Cell, Voxel, VoxelSet};
 use crate::skill::{AVOIDED, Ground, LIKELY, Rejection};
 use crate::world::STROKE_M;
@@ -14,7 +14,7 @@ const HEIGHTS_M: [f32; 2] = [0.03, 0.12];
 const TRIED_M: [f32; 5] = [0.0, 0.02, -0.02, 0.04, -0.04];
 /// Rows before the first solid voxel in which the front may be.
 const UNSURE_ROWS: usize = 2;
-/// How far from where it did not seal a cup is tried again, in radii.
+/// How far beside where it did not seal a cup is tried again, in radii.
 const TRIED_APART: f32 = 1.0;
 /// Largest tangent of the angle between a front and the entrance's plane: 30 degrees.
 const STEEPEST: f32 = 0.577;
@@ -59,7 +59,7 @@ impl<'a> Shelf<'a> {
             let Some(first) = first.filter(|cell| !objects.iter().any(|object| object.contains(*cell))) else {
                 continue;
             };
-            objects.push(self.plan.patch(first, OBJECT_RADIUS_M));
+            objects.push(instances::object(&self.plan, &self.belief.grid, first));
         }
         objects
     }
@@ -120,8 +120,9 @@ impl<'a> Shelf<'a> {
             let contact = Voxel { x: x as u16, y: mean.ceil() as u16, z: level as u16 };
             (contact, Point::new(at.x, y, grid.origin[2] + z_m), slope)
         });
-        let is_new =
-            |touch: &Point| self.unsealed.iter().all(|at| (Point::from(*at) - touch).norm() > TRIED_APART * radius_m);
+        // Edges and seams run up a front: what did not seal at one height does not at another.
+        let apart = |at: &[f32; 3], touch: &Point| (at[0] - touch.x).hypot(at[1] - touch.y);
+        let is_new = |touch: &Point| self.unsealed.iter().all(|at| apart(at, touch) > TRIED_APART * radius_m);
         found.filter(|(_, touch, _)| is_new(touch))
     }
 

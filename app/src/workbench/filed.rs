@@ -49,7 +49,7 @@ pub fn open(path: &Path, catalog: Arc<Catalog>) -> Result<Opened> {
             bodies: bodies.clone(),
             scores: record.scores_after(step).copied(),
             entropy_nats: record.entropy_after(step),
-            outcome: done.map(|done| Arc::new(outcome(done))),
+            outcome: done.map(|done| Arc::new(StepOutcome::of_log(done.clone()))),
             frame: done.and_then(|done| frame(&directory, &record, done)),
             is_whole: false,
         }));
@@ -72,19 +72,6 @@ fn setup(record: &EpisodeRecord, catalog: Arc<Catalog>) -> Result<Setup> {
         unreachable: Arc::new(unreachable),
         hidden: None,
     })
-}
-
-/// What the log tells of a step.
-fn outcome(step: &StepRecord) -> StepOutcome {
-    StepOutcome {
-        record: step.clone(),
-        frame: None,
-        observation: None,
-        swept: None,
-        prediction: None,
-        manipulated: None,
-        motion: None,
-    }
 }
 
 /// The image of a look with its noise, if it is filed.

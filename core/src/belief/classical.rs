@@ -11,6 +11,8 @@
 
 mod manipulated;
 
+pub(super) use manipulated::GONE;
+
 use super::{Belief, BeliefUpdate, CLASSICAL, FloorPlan, Intervention, Prediction, SOLID, predict_held_apart};
 use crate::camera::MapObservation;
 use crate::scene::CLASS_COUNT;

@@ -4,13 +4,10 @@
 //! nobody has seen there stays unknown. Both happen with the chance that the object is held; the change is that chance in
 //! the columns that are left or come to, so what is there counts as unseen until it is looked at.
 
-use super::classical::{LOG_ODDS_LIMIT, evidence};
+use super::classical::{GONE, LOG_ODDS_LIMIT, evidence};
 use super::{Belief, Intervention, Prediction, beta_mean};
 use crate::grid::Window;
 use crate::scene::{BACKGROUND, CLASS_COUNT};
-
-/// Evidence for free space where an object has left, strong enough to outweigh the old evidence in the mixture.
-const GONE: f32 = 100.0;
 
 /// What is predicted of something that is held, with the chance that it is.
 pub(super) fn predict(belief: &Belief, intervention: &Intervention, chance: f32) -> Prediction {

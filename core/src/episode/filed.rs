@@ -133,15 +133,7 @@ impl Episode {
     /// Takes note of a step of a log, and of what its belief update was told.
     fn retell(&mut self, step: &StepRecord, told: Option<Told>) -> StepOutcome {
         let (config, shelf) = (self.record().config.clone(), self.record().scene.shelf);
-        let mut outcome = StepOutcome {
-            record: step.clone(),
-            frame: None,
-            observation: None,
-            swept: None,
-            prediction: None,
-            manipulated: None,
-            motion: None,
-        };
+        let mut outcome = StepOutcome::of_log(step.clone());
         let mut estimate = self.estimate().clone();
         match told {
             Some(Told::Frame(sensed)) => {

@@ -315,3 +315,10 @@ pub struct StepOutcome {
     /// How the arm moved as it was planned: to the view, or to the contact, along it and back.
     pub motion: Option<Motion>,
 }
+
+impl StepOutcome {
+    /// What the log alone tells of a step.
+    pub fn of_log(record: StepRecord) -> Self {
+        Self { record, frame: None, observation: None, swept: None, prediction: None, manipulated: None, motion: None }
+    }
+}

@@ -35,8 +35,8 @@ pub const FAR_M: f32 = 0.09;
 pub const AHEAD_M: f32 = 0.06;
 /// Lower than any object is high, metres: what passes here passes through the whole column.
 pub const SHORTEST_M: f32 = 0.06;
-/// Evidence for free space where an object has left, strong enough to outweigh the old evidence in the gate.
-const GONE: f32 = 100.0;
+/// Evidence for free space where an object has left, strong enough to outweigh the old evidence in a mixture.
+pub const GONE: f32 = 100.0;
 
 /// The belief that a manipulation is predicted to leave. `plan` holds the occupied floor cells
 /// ([`SOLID`](crate::belief::SOLID)).

@@ -118,7 +118,8 @@ def main() -> None:
             request = json.loads(line)
             answer = {"id": request["id"]}
         except (ValueError, KeyError, TypeError):
-            sys.exit("mujoco_shelf.py: a line that is no request")
+            print("mujoco_shelf.py: a line that is no request", file=sys.stderr)
+            sys.exit(2)
         if "end" in request:
             break
         try:

@@ -3,7 +3,8 @@
 
     compare_mujoco.py images EPISODE...     the same views in both: the looks of built-in episodes before their first push
     compare_mujoco.py pushes EPISODE...     the same motion in both: the first push of built-in episodes
-    compare_mujoco.py scores EPISODE THERE TRUTH    an episode in MuJoCo (THERE, and the file that --truth wrote) and a built-in one
+    compare_mujoco.py scores EPISODE THERE TRUTH    the last maps of a built-in episode and of one in MuJoCo (THERE), of which
+                                            the world wrote the truth (--truth TRUTH)
 """
 
 import argparse
@@ -71,16 +72,39 @@ def builtin_truth(folder: Path, index: int, voxel_m: float) -> dict:
     return middles(filed["objects"].astype(int), filed["occupancy"].astype(bool), voxel_m)
 
 
-def moved(before: dict, after: dict) -> tuple[dict[int, np.ndarray], set[int]]:
-    """How far the middle of every object moved, metres, and which are toppled."""
+def moved(before: dict, after: dict) -> tuple[dict[int, np.ndarray], int]:
+    """How far the middle of every object moved, metres, and how many are toppled."""
     both = before.keys() & after.keys()
     ways = {at: after[at][0] - before[at][0] for at in both}
-    return ways, {at for at in both if after[at][1] < (1 - TOPPLED) * before[at][1]}
+    return ways, sum(after[at][1] < (1 - TOPPLED) * before[at][1] for at in both)
+
+
+def far(ways: dict[int, np.ndarray]) -> set[int]:
+    """The objects that moved."""
+    return {at for at, way in ways.items() if np.linalg.norm(way) > MOVED_M}
+
+
+def push_there(scene: dict, step: dict) -> tuple[dict, int, float, int, bool]:
+    """Carries a step's motion out in MuJoCo: ways of the objects' middles, how many toppled, the sum of all displacements,
+    metres, how many left the shelf, and whether the arm stalled."""
+    shelf, voxel_m = Shelf(scene), scene["shelf"]["voxel_m"]
+
+    def standing() -> tuple[dict, np.ndarray]:
+        poses = shelf.poses()
+        truth = Truth(shelf, scene, poses)
+        return middles(truth.objects, truth.occupancy, voxel_m), np.array([pose["position"] for pose in poses])
+
+    before, origins = standing()
+    _, stalled = shelf.carry_out(motion_of(step))
+    after, moved_origins = standing()
+    ways, toppled = moved(before, after)
+    total_m = float(np.linalg.norm(moved_origins - origins, axis=1)[~shelf.gone].sum())
+    return ways, toppled, total_m, int(shelf.gone.sum()), stalled
 
 
 def pushes(folders: list[Path]) -> None:
-    """Compares what the first push of episodes does. Displacements are of the objects' middles, mm."""
-    table("episode", "moved here / there", "sum, mm", "sum in MuJoCo, mm", "mean difference, mm", "largest, mm", "toppled", "left", "stalled")
+    """Compares what the first push of episodes does: here in the built-in simulator, there in MuJoCo."""
+    table("episode", "moved", "sum, mm", "differ in the mean, mm", "at most, mm", "toppled", "left", "stalled")
     differences, totals = [], []
     for folder in folders:
         episode = read_episode(folder)
@@ -88,33 +112,36 @@ def pushes(folders: list[Path]) -> None:
         if step is None:
             print(f"{folder}: nothing was pushed", file=sys.stderr)
             continue
-        scene, index = episode["scene"], step["index"]
-        voxel_m = scene["shelf"]["voxel_m"]
-        ways, toppled = moved(builtin_truth(folder, 0, voxel_m), builtin_truth(folder, index, voxel_m))
-        shelf = Shelf(scene)
-        told = [Truth(shelf, scene, shelf.poses())]
-        before = np.array([pose["position"] for pose in shelf.poses()])
-        _, stalled = shelf.carry_out(motion_of(step))
-        told.append(Truth(shelf, scene, shelf.poses()))
-        after = np.array([pose["position"] for pose in shelf.poses()])
-        there, toppled_there = moved(*(middles(truth.objects, truth.occupancy, voxel_m) for truth in told))
-        far = lambda ways: {at for at, way in ways.items() if np.linalg.norm(way) > MOVED_M}
+        voxel_m = episode["scene"]["shelf"]["voxel_m"]
+        ways, toppled = moved(builtin_truth(folder, 0, voxel_m), builtin_truth(folder, step["index"], voxel_m))
+        there, toppled_there, total_m, left, stalled = push_there(episode["scene"], step)
         either = [at for at in far(ways) | far(there) if at in ways and at in there]
-        off = [1000 * np.linalg.norm(ways[at] - there[at]) for at in either]
+        off = [1000 * float(np.linalg.norm(ways[at] - there[at])) for at in either]
         differences.extend(off)
-        total = 1000 * step["displacement_m"], 1000 * float(np.linalg.norm(after - before, axis=1)[~shelf.gone].sum())
-        totals.append(total)
+        totals.append((1000 * step["displacement_m"], 1000 * total_m))
         row(
-            f"`{folder.name}`", f"{len(far(ways))} / {len(far(there))}", f"{total[0]:.0f}", f"{total[1]:.0f}",
-            f"{np.mean(off):.1f}" if off else "–", f"{max(off):.1f}" if off else "–",
-            f"{len(toppled)} / {len(toppled_there)}", f"{len(step['dropped'])} / {int(shelf.gone.sum())}",
+            f"`{folder.name}`",
+            f"{len(far(ways))} / {len(far(there))}",
+            f"{totals[-1][0]:.0f} / {totals[-1][1]:.0f}",
+            f"{np.mean(off):.1f}" if off else "–",
+            f"{max(off):.1f}" if off else "–",
+            f"{toppled} / {toppled_there}",
+            f"{len(step['dropped'])} / {left}",
             f"{'yes' if step['push']['stalled'] else 'no'} / {'yes' if stalled else 'no'}",
         )
-    here, there = np.array(totals).T
-    print(f"\n{len(totals)} pushes; sums of displacements {here.sum():.0f} and {there.sum():.0f} mm, correlation "
-          f"{np.corrcoef(here, there)[0, 1]:.3f}; of {len(differences)} objects that moved more than {1000 * MOVED_M:.0f} mm "
-          f"in either, the displacements differ by {np.median(differences):.1f} mm (median), {np.mean(differences):.1f} mm "
-          f"(mean), {np.quantile(differences, 0.9):.1f} mm (nine of ten)")
+    if totals:
+        summary(np.array(totals), np.array(differences))
+
+
+def summary(totals: np.ndarray, differences: np.ndarray) -> None:
+    """What the pushes say together."""
+    here_mm, there_mm = totals.sum(axis=0)
+    print(f"\n{len(totals)} pushes: displacements sum up to {here_mm:.0f} mm here, {there_mm:.0f} mm there.")
+    if len(totals) > 2:
+        print(f"Correlation of the pushes' sums: {np.corrcoef(*totals.T)[0, 1]:.3f}.")
+    if len(differences):
+        middle, tail = np.quantile(differences, [0.5, 0.9])
+        print(f"{len(differences)} objects moved; ways differ by {middle:.1f} mm in the median, {tail:.1f} mm for nine of ten.")
 
 
 def judged(there: Path, truth_file: Path, scene: dict) -> dict[str, float]:

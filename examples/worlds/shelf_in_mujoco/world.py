@@ -20,7 +20,7 @@ REST_S = 0.2
 SETTLE_LIMIT_S = 4.0
 # How far below the board a centre of mass must be for the object to be taken away, metres.
 FALL_M = 0.10
-# Speed of the tip on the way back, and the largest of a joint unless the arm's file says less: m/s, rad/s.
+# Largest speed on the way back, of the tip, m/s, and of a joint, rad/s.
 WAY_BACK_M_S = 0.50
 JOINT_SPEED = 3.0
 # Shares of speed lost per second, stand-ins for rolling resistance.
@@ -150,7 +150,7 @@ class Shelf:
         return float(self.data.efc_force[contacts.efc_address[touching]].sum())
 
     def carry_out(self, move: dict) -> tuple[int, bool]:
-        """Carries out a motion of the protocol. Returns how many stops before the retreat were passed, and whether it stalled."""
+        """Carries out a motion of the protocol. Returns how many stops before the retreat it passed, and whether it stalled."""
         phases = move.get("phases") or []
         self.check(move, phases)
         outward = [phase for phase in phases if phase["kind"] != "retreat"]
@@ -190,7 +190,7 @@ class Shelf:
                 raise WorldError(f"a phase `{kind}` whose stops are not {len(self.arm_joints)} joints each")
 
     def order(self, names: list[str] | None) -> list[int]:
-        """Where the arm's joints are in the stops of a motion; motions of the past come without names, in the chain's order."""
+        """Where the arm's joints are in the stops of a motion. What was done before comes without names, in the chain's order."""
         if not names:
             return list(range(len(self.arm_joints)))
         if sorted(names) != sorted(self.arm_joints):

@@ -2,7 +2,7 @@
 """How the MuJoCo world agrees with the built-in simulator, as tables. Needs `pip install mujoco numpy zstandard`.
 
     compare_mujoco.py images EPISODE...     the same views in both: the looks of built-in episodes before their first push
-    compare_mujoco.py pushes EPISODE...     the same motion in both: the first push of built-in episodes
+    compare_mujoco.py pushes EPISODE...     the same motions in both: the pushes of built-in episodes
     compare_mujoco.py scores EPISODE THERE TRUTH    the last maps of a built-in episode and of one in MuJoCo (THERE), of which
                                             the world wrote the truth (--truth TRUTH)
 """
@@ -10,7 +10,6 @@
 import argparse
 import json
 import os
-import sys
 from pathlib import Path
 
 os.environ.setdefault("MUJOCO_GL", "disable")
@@ -84,64 +83,88 @@ def far(ways: dict[int, np.ndarray]) -> set[int]:
     return {at for at, way in ways.items() if np.linalg.norm(way) > MOVED_M}
 
 
-def push_there(scene: dict, step: dict) -> tuple[dict, int, float, int, bool]:
-    """Carries a step's motion out in MuJoCo: ways of the objects' middles, how many toppled, the sum of all displacements,
-    metres, how many left the shelf, and whether the arm stalled."""
-    shelf, voxel_m = Shelf(scene), scene["shelf"]["voxel_m"]
+class There:
+    """The same scene in MuJoCo, where the episode's motions are carried out one after the other."""
 
-    def standing() -> tuple[dict, np.ndarray]:
-        poses = shelf.poses()
-        truth = Truth(shelf, scene, poses)
-        return middles(truth.objects, truth.occupancy, voxel_m), np.array([pose["position"] for pose in poses])
+    def __init__(self, scene: dict):
+        self.scene, self.shelf = scene, Shelf(scene)
 
-    before, origins = standing()
-    _, stalled = shelf.carry_out(motion_of(step))
-    after, moved_origins = standing()
-    ways, toppled = moved(before, after)
-    total_m = float(np.linalg.norm(moved_origins - origins, axis=1)[~shelf.gone].sum())
-    return ways, toppled, total_m, int(shelf.gone.sum()), stalled
+    def standing(self) -> tuple[dict, np.ndarray]:
+        """Middles and heights of the objects, and where their origins are."""
+        poses = self.shelf.poses()
+        truth = Truth(self.shelf, self.scene, poses)
+        found = middles(truth.objects, truth.occupancy, truth.voxel_m)
+        return found, np.array([pose["position"] for pose in poses])
+
+    def push(self, step: dict) -> dict:
+        """Ways of the middles, how many toppled, the sum of displacements, mm, how many left the shelf, whether it stalled."""
+        before, origins = self.standing()
+        gone = int(self.shelf.gone.sum())
+        _, stalled = self.shelf.carry_out(motion_of(step))
+        after, moved_origins = self.standing()
+        ways, toppled = moved(before, after)
+        way_mm = 1000 * np.linalg.norm(moved_origins - origins, axis=1)[~self.shelf.gone].sum()
+        left = int(self.shelf.gone.sum()) - gone
+        return {"ways": ways, "toppled": toppled, "sum": float(way_mm), "left": left, "stalled": stalled}
+
+
+def pushes_here(folder: Path, episode: dict):
+    """Per push of a built-in episode its step, and the same of what it did."""
+    voxel_m, last = episode["scene"]["shelf"]["voxel_m"], 0
+    for step in filter(is_push, episode["steps"]):
+        truths = [builtin_truth(folder, index, voxel_m) for index in (last, step["index"])]
+        ways, toppled = moved(*truths)
+        done = {"sum": 1000 * step["displacement_m"], "left": len(step["dropped"]), "stalled": step["push"]["stalled"]}
+        yield step, {"ways": ways, "toppled": toppled, **done}
+        last = step["index"]
+
+
+def differences(here: dict, there: dict) -> list[float]:
+    """How far apart the ways of the objects are that moved in either, mm."""
+    ways = here["ways"], there["ways"]
+    either = (far(ways[0]) | far(ways[1])) & ways[0].keys() & ways[1].keys()
+    return [1000 * float(np.linalg.norm(ways[0][at] - ways[1][at])) for at in sorted(either)]
 
 
 def pushes(folders: list[Path]) -> None:
-    """Compares what the first push of episodes does: here in the built-in simulator, there in MuJoCo."""
-    table("episode", "moved", "sum, mm", "differ in the mean, mm", "at most, mm", "toppled", "left", "stalled")
-    differences, totals = [], []
+    """Compares what the pushes of episodes do: here in the built-in simulator, there in MuJoCo. The first push of an episode
+    meets the same shelf in both, a later one what the pushes before have left."""
+    table("episode, push", "moved", "sum, mm", "differ in the mean, mm", "at most, mm", "toppled", "left", "stalled")
+    rows: list[tuple[int, float, float, list[float]]] = []
     for folder in folders:
         episode = read_episode(folder)
-        step = next((step for step in episode["steps"] if is_push(step)), None)
-        if step is None:
-            print(f"{folder}: nothing was pushed", file=sys.stderr)
-            continue
-        voxel_m = episode["scene"]["shelf"]["voxel_m"]
-        ways, toppled = moved(builtin_truth(folder, 0, voxel_m), builtin_truth(folder, step["index"], voxel_m))
-        there, toppled_there, total_m, left, stalled = push_there(episode["scene"], step)
-        either = [at for at in far(ways) | far(there) if at in ways and at in there]
-        off = [1000 * float(np.linalg.norm(ways[at] - there[at])) for at in either]
-        differences.extend(off)
-        totals.append((1000 * step["displacement_m"], 1000 * total_m))
-        row(
-            f"`{folder.name}`",
-            f"{len(far(ways))} / {len(far(there))}",
-            f"{totals[-1][0]:.0f} / {totals[-1][1]:.0f}",
-            f"{np.mean(off):.1f}" if off else "–",
-            f"{max(off):.1f}" if off else "–",
-            f"{toppled} / {toppled_there}",
-            f"{len(step['dropped'])} / {left}",
-            f"{'yes' if step['push']['stalled'] else 'no'} / {'yes' if stalled else 'no'}",
-        )
-    if totals:
-        summary(np.array(totals), np.array(differences))
+        there = There(episode["scene"])
+        for number, (step, here) in enumerate(pushes_here(folder, episode), start=1):
+            other = there.push(step)
+            off = differences(here, other)
+            rows.append((number, here["sum"], other["sum"], off))
+            stalled = " / ".join("yes" if told["stalled"] else "no" for told in (here, other))
+            row(
+                f"`{folder.name}`, {number}",
+                f"{len(far(here['ways']))} / {len(far(other['ways']))}",
+                f"{here['sum']:.0f} / {other['sum']:.0f}",
+                f"{np.mean(off):.1f}" if off else "–",
+                f"{max(off):.1f}" if off else "–",
+                f"{here['toppled']} / {other['toppled']}",
+                f"{here['left']} / {other['left']}",
+                stalled,
+            )
+    for name, some in [("first", [r for r in rows if r[0] == 1]), ("later", [r for r in rows if r[0] > 1])]:
+        if some:
+            summary(name, some)
 
 
-def summary(totals: np.ndarray, differences: np.ndarray) -> None:
-    """What the pushes say together."""
-    here_mm, there_mm = totals.sum(axis=0)
-    print(f"\n{len(totals)} pushes: displacements sum up to {here_mm:.0f} mm here, {there_mm:.0f} mm there.")
-    if len(totals) > 2:
-        print(f"Correlation of the pushes' sums: {np.corrcoef(*totals.T)[0, 1]:.3f}.")
-    if len(differences):
-        middle, tail = np.quantile(differences, [0.5, 0.9])
-        print(f"{len(differences)} objects moved; ways differ by {middle:.1f} mm in the median, {tail:.1f} mm for nine of ten.")
+def summary(name: str, rows: list[tuple[int, float, float, list[float]]]) -> None:
+    """What some pushes say together."""
+    sums = np.array([(here, there) for _, here, there, _ in rows])
+    off = [way for *_, ways in rows for way in ways]
+    here_mm, there_mm = sums.sum(axis=0)
+    print(f"\n{len(rows)} {name} pushes: displacements sum up to {here_mm:.0f} mm here, {there_mm:.0f} mm there.")
+    if len(rows) > 2:
+        print(f"Correlation of the pushes' sums: {np.corrcoef(*sums.T)[0, 1]:.3f}.")
+    if off:
+        middle, tail = np.quantile(off, [0.5, 0.9])
+        print(f"{len(off)} objects moved; ways differ by {middle:.1f} mm in the median, {tail:.1f} mm for nine of ten.")
 
 
 def judged(there: Path, truth_file: Path, scene: dict) -> dict[str, float]:

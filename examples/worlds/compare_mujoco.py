@@ -184,6 +184,7 @@ def compare_scores(folder: Path, there: Path, truth_file: Path) -> None:
     names = ["occupancy_iou", "occupied_iou", "semantic_miou"]
     steps = f"{len(episode['steps'])} / {len(other['steps'])}"
     cells = [f"{last[name]:.3f} / {mine[name]:.3f}" for name in names]
+    table("shelf", "actions", "pushes", "IoU", "occupied IoU", "mIoU")
     row(f"`{episode['scene']['name']}`", steps, f"{count[0]} / {count[1]}", *cells)
 
 

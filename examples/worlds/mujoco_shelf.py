@@ -22,7 +22,7 @@ def arguments() -> argparse.Namespace:
         "--renderer",
         choices=["rays", "gl"],
         default="rays",
-        help="how images are made: by casting rays on the processor, or by OpenGL (MUJOCO_GL: egl unless set)",
+        help="how images are made: by casting rays on the processor, or by OpenGL (on Linux MUJOCO_GL is egl unless set)",
     )
     parser.add_argument("--truth", type=Path, help="write where the objects really are to this file, a line per motion")
     return parser.parse_args()
@@ -106,7 +106,10 @@ def words_of(error: Exception) -> str:
 def main() -> None:
     """Answers a line for a line until there are no more."""
     typed = arguments()
-    os.environ.setdefault("MUJOCO_GL", "egl" if typed.renderer == "gl" else "disable")
+    if typed.renderer == "rays":
+        os.environ["MUJOCO_GL"] = "disable"
+    elif sys.platform == "linux":
+        os.environ.setdefault("MUJOCO_GL", "egl")
     try:
         from shelf_in_mujoco.world import Shelf
     except ModuleNotFoundError as error:

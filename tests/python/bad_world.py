@@ -1,6 +1,6 @@
-"""A world that serves a recording through examples/worlds/replay.py and misbehaves at its third look.
+"""A world that serves a recording through examples/worlds/replay.py and misbehaves at its third look, or at another.
 
-    bad_world.py REPLAY RECORDING KIND
+    bad_world.py REPLAY RECORDING KIND [LOOK]
 """
 
 import json
@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-replay, recording, kind = sys.argv[1:]
+replay, recording, kind, *look = sys.argv[1:]
 served = subprocess.Popen([sys.executable, replay, recording], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 looks, folder = 0, None
 for line in sys.stdin:
@@ -22,7 +22,7 @@ for line in sys.stdin:
     answer = served.stdout.readline()
     folder = Path(request["begin"]["folder"]) if "begin" in request else folder
     looks += "look" in request
-    if looks == 3:
+    if looks == int(*look or [3]):
         told = json.loads(answer)
         if kind == "late":
             time.sleep(15)

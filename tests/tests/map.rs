@@ -6,6 +6,8 @@ mod bad;
 mod formats;
 #[path = "map/mcaps.rs"]
 mod mcaps;
+#[path = "map/mujoco.rs"]
+mod mujoco;
 #[path = "map/real.rs"]
 mod real;
 #[path = "map/world.rs"]

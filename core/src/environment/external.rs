@@ -50,9 +50,10 @@ impl External {
     /// views that are none.
     pub fn start(settings: &WorldSettings, scene: &Scene, done: &[PhasedMotion]) -> Result<Self> {
         let mut program = Program::start(settings)?;
+        let arm = Arm::placed(&scene.robot)?;
         let scene = serde_json::to_value(scene).map_err(|error| Error::Usage(error.to_string()))?;
         let folder = settings.folder.to_string_lossy().into_owned();
-        let done = done.iter().map(|motion| Move::of(motion, &[])).collect();
+        let done = done.iter().map(|motion| Move::of(motion, &names(&arm))).collect();
         let begin = Begin { protocol: PROTOCOL, folder, seed: settings.seed, scene, done };
         let ready = match program.ask(Asked::Begin(Box::new(begin)), "beginning")? {
             Answer::Ready(ready) => ready,
@@ -86,6 +87,11 @@ impl External {
         let frame = frame_of_files(&depth, answer.depth_unit_m, labels.as_deref(), camera, pose);
         Ok(Sensed { frame: frame.map_err(|error| format!("gives an image: {error}"))?, objects: None })
     }
+}
+
+/// The names of an arm's joints, in the order of a motion's numbers.
+fn names(arm: &Arm) -> Vec<&str> {
+    arm.joints.iter().map(|joint| joint.name.as_str()).collect()
 }
 
 /// The views that a program offers, if they are its own.
@@ -131,8 +137,7 @@ impl Environment for External {
     }
 
     fn carry_out(&mut self, arm: &Arm, motion: &PhasedMotion) -> Result<ManipulationOutcome> {
-        let names: Vec<&str> = arm.joints.iter().map(|joint| joint.name.as_str()).collect();
-        match self.program.ask(Asked::Move(Move::of(motion, &names)), "moving")? {
+        match self.program.ask(Asked::Move(Move::of(motion, &names(arm))), "moving")? {
             Answer::Moved(moved) => outcome(arm, motion, &moved).map_err(|words| self.program.fail(&words)),
             other => Err(self.program.wrong("moved", &other)),
         }

@@ -94,6 +94,19 @@ pub(super) fn summary(columns: &[Column]) {
         let (first, last) = (record.prior.entropy_nats, record.entropy_after(record.steps.len()));
         if record.steps.is_empty() { String::new() } else { format!("{last:.0} nats of {first:.0}") }
     });
+    if columns.iter().any(|column| column.record.has_truth()) {
+        judged(columns);
+    }
+    line("the arm moved for", columns, |column| format!("{:.0} s", total(column, |step| step.motion_s)));
+    line("time", columns, |column| format!("{:.1} s", column.seconds));
+    for (name, of) in PARTS {
+        line(&format!("  {name}"), columns, |column| format!("{:.1}", total(column, of)));
+    }
+    line("written to", columns, |column| column.out.display().to_string());
+}
+
+/// What only the truth tells: which objects were found, and what was moved.
+fn judged(columns: &[Column]) {
     line("objects found", columns, |column| {
         format!("{} of {}", count(column, Verdict::Found), column.record.scene.objects.len())
     });
@@ -105,12 +118,6 @@ pub(super) fn summary(columns: &[Column]) {
         let dropped: usize = column.record.steps.iter().map(|step| step.dropped().len()).sum();
         format!("{:.2} m, {dropped}", total(column, |step| step.displacement_m().unwrap_or(0.0)))
     });
-    line("the arm moved for", columns, |column| format!("{:.0} s", total(column, |step| step.motion_s)));
-    line("time", columns, |column| format!("{:.1} s", column.seconds));
-    for (name, of) in PARTS {
-        line(&format!("  {name}"), columns, |column| format!("{:.1}", total(column, of)));
-    }
-    line("written to", columns, |column| column.out.display().to_string());
 }
 
 /// The seconds that a part of a step took.

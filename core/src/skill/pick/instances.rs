@@ -7,7 +7,7 @@
 
 use crate::belief::{FloorPlan, OBJECT_RADIUS_M, Patch};
 use crate::grid::Grid;
-use crate::scene::{Catalog, outline};
+use crate::scene::{Catalog, ClassId, outline};
 use std::ops::RangeInclusive;
 
 /// Footprints from which on a patch is more than one object.
@@ -35,7 +35,7 @@ struct Footprint {
 }
 
 impl Footprint {
-    fn of(class: crate::scene::ClassId) -> Option<Self> {
+    fn of(class: ClassId) -> Option<Self> {
         let catalog = Catalog::standard();
         let corners = &catalog.classes.get(usize::from(class.0))?.footprint;
         let side = |axis: usize| {
@@ -62,10 +62,11 @@ impl<'a> Front<'a> {
         let [width, depth, _] = grid.dims;
         let at = from / depth;
         let first = |x: usize| (0..depth).find(|y| patch.contains(x * depth + y));
-        let runs_on = |x: usize, next: usize| Some(first(x)?.abs_diff(first(next)?) <= STEP_ROWS).filter(|on| *on);
+        let runs_on =
+            |x: usize, next: usize| first(x).zip(first(next)).is_some_and(|(a, b)| a.abs_diff(b) <= STEP_ROWS);
         first(at)?;
-        let left = (1..=at).rev().take_while(|x| runs_on(*x, x - 1).is_some()).last().map_or(at, |x| x - 1);
-        let right = (at..width - 1).take_while(|x| runs_on(*x, x + 1).is_some()).last().map_or(at, |x| x + 1);
+        let left = (1..=at).rev().take_while(|x| runs_on(*x, x - 1)).last().map_or(at, |x| x - 1);
+        let right = (at..width - 1).take_while(|x| runs_on(*x, x + 1)).last().map_or(at, |x| x + 1);
         let behind = |x: usize| {
             let first = first(x).unwrap_or(depth);
             (first..depth).take_while(|y| patch.contains(x * depth + y)).count()
@@ -133,8 +134,7 @@ mod tests {
         }
         let mm = |m: f32| (m * 1e3).round() as i32;
         let bounds = |object: &Patch| {
-            let points: Vec<Point> =
-                object.cells().iter().map(|cell| grid.cell_center(grid.cell(*cell)).into()).map(|p: Point| p).collect();
+            let points: Vec<Point> = object.cells().iter().map(|cell| grid.cell_center(grid.cell(*cell))).collect();
             let x = |pick: fn(f32, f32) -> f32, start| points.iter().map(|p| p.x).fold(start, pick);
             let back = points.iter().map(|p| p.y).fold(f32::MIN, f32::max);
             [mm(x(f32::min, f32::MAX) - 0.0025), mm(x(f32::max, f32::MIN) + 0.0025), mm(back + 0.0025)]
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn boxes_of_one_class_that_touch_are_told_apart_by_the_size_of_their_class() {
-        let [w, d, _] = size(CRACKER);
+        let [w, d] = sides(CRACKER);
         // Three with their narrow sides to the front, and two broadside.
         let row = |count: usize, w: f32, d: f32| -> Vec<[f32; 4]> {
             (0..count).map(|i| [i as f32 * w - 0.15, (i + 1) as f32 * w - 0.15, 0.1, 0.1 + d]).collect()
@@ -162,16 +162,16 @@ mod tests {
 
     #[test]
     fn one_object_stays_whole_whichever_side_it_shows() {
-        let [w, d, _] = size(CRACKER);
+        let [w, d] = sides(CRACKER);
         for [w, d] in [[w, d], [d, w], [1.1 * w, 1.1 * d]] {
             let one = found(&[[-0.05, w - 0.05, 0.1, 0.1 + d]], CRACKER);
             assert_eq!(one.len(), 1, "{one:?}");
         }
     }
 
-    fn size(class: usize) -> [f32; 3] {
-        let catalog = Catalog::standard();
-        let of = Footprint::of(catalog.classes[class].id).expect("a class");
-        [of.sides_m[0].max(of.sides_m[1]), of.sides_m[0].min(of.sides_m[1]), 0.0]
+    /// The longer and the shorter side of a class's footprint, metres.
+    fn sides(class: usize) -> [f32; 2] {
+        let [a, b] = Footprint::of(Catalog::standard().classes[class].id).expect("a class").sides_m;
+        [a.max(b), a.min(b)]
     }
 }

@@ -67,7 +67,7 @@ pub(super) fn go_on(
     out: &Path,
     watch: Observer<'_>,
 ) -> Result<Driver> {
-    let done: Vec<_> = logged.steps.iter().filter_map(|step| done(step)).collect();
+    let done: Vec<_> = logged.steps.iter().filter_map(done).collect();
     let world = Box::new(External::start(&settings(args, logged.config.seed)?, scene, &done)?);
     Driver::resume_within(world, out, catalog, update, watch)
 }

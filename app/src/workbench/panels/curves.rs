@@ -16,7 +16,8 @@ use re_viewer::external::egui::{
 const SHARES: [&str; 3] = ["occupancy_iou", "occupied_iou", "semantic_miou"];
 const ENTROPY: &str = "entropy_nats";
 
-/// Draws the curves: shares and entropy side by side, or below each other where there is little room.
+/// Draws the curves: shares and entropy side by side, or below each other where there is little room; entropy alone where
+/// nothing is scored.
 pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     let Some(session) = model.session() else { return empty(ui, NO_EPISODE) };
     let other = model.other_session().filter(|_| model.kept.layout == LayoutKind::Compare);
@@ -30,7 +31,9 @@ pub fn show(ui: &mut Ui, model: &mut Model, ask: &mut Vec<Command>) {
     // Measured from the panel's own edge: what is drawn must never be taller than the panel, or the panel would grow with
     // every frame.
     let (top, bottom) = (ui.cursor().top(), ui.max_rect().bottom());
-    if ui.available_width() >= 560.0 {
+    if !curves.is_scored() {
+        curves.plot(ui, "Entropy", &entropy, curves.entropy_range(), bottom, ask);
+    } else if ui.available_width() >= 560.0 {
         let left = (0.6 * (ui.available_width() - gap)).floor();
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing.x = gap;
@@ -63,6 +66,11 @@ struct Curves<'a> {
 }
 
 impl Curves<'_> {
+    /// Whether the truth is known of one of the episodes.
+    fn is_scored(&self) -> bool {
+        std::iter::once(self.session).chain(self.other).any(|session| session.record.has_truth())
+    }
+
     /// From 0 to a little above the largest entropy.
     fn entropy_range(&self) -> [f64; 2] {
         let sessions = std::iter::once(self.session).chain(self.other);

@@ -226,17 +226,14 @@ fn classes(ui: &mut Ui, session: &Session) {
     legend::swatches(ui, class_entries(session));
 }
 
-/// Colours and names of the classes in a scene, of background, and of what is unknown.
+/// Colours and names of the classes in a scene, of background, and of what is unknown. Where nobody knows what stands there, all
+/// classes are named.
 pub fn class_entries(session: &Session) -> Vec<(Rgb, String)> {
     let catalog = &session.setup.catalog;
-    let present: BTreeSet<ClassId> = session
-        .record
-        .scene
-        .objects
-        .iter()
-        .filter_map(|object| catalog.by_name(&object.class).map(|class| class.id))
-        .chain([BACKGROUND])
-        .collect();
+    let objects = session.record.scene.objects.iter();
+    let told = objects.filter_map(|object| catalog.by_name(&object.class).map(|class| class.id));
+    let all = catalog.classes.iter().map(|class| class.id).filter(|_| !session.record.has_truth());
+    let present: BTreeSet<ClassId> = told.chain(all).chain([BACKGROUND]).collect();
     let named = |class: ClassId| (colors::of_class(catalog, class), colors::class_title(catalog, class));
     let unknown = (colors::UNKNOWN_RGB, "unknown".to_owned());
     present.into_iter().map(named).chain([unknown]).collect()

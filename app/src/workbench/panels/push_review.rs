@@ -92,11 +92,14 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
             "Objects that moved by more than 2 mm",
         ),
         fact("displacement", format!("{:.0} mm", total * 1e3), "Of all objects together"),
-        fact(
-            "tool went",
-            length(&outcome.record).unwrap_or_default(),
-            "How far the tip moved in contact, of the length that was planned",
-        ),
+        match pushed.grip {
+            Some(grip) => fact("grip", grip.end.to_string(), "How holding the object ended"),
+            None => fact(
+                "tool went",
+                length(&outcome.record).unwrap_or_default(),
+                "How far the tip moved in contact, of the length that was planned",
+            ),
+        },
         fact("blocked", if pushed.stalled { "yes" } else { "no" }, "Whether the arm met too much force and stopped"),
         fact("dropped", dropped, "Objects that left the board"),
         fact("cells changed", number(review.changed), "Floor cells in whose column something really changed"),
@@ -111,7 +114,7 @@ pub fn show(ui: &mut Ui, review: &Review, record: &EpisodeRecord, moment: &Momen
         ),
     ];
     // What only somebody who knows the truth can say.
-    let told = |name: &str| ["tool went", "blocked", "predicted to change"].contains(&name);
+    let told = |name: &str| ["tool went", "grip", "blocked", "predicted to change"].contains(&name);
     let facts: Vec<_> = facts.into_iter().filter(|fact| record.has_truth() || told(fact.name)).collect();
     facts::show(ui, "push review", 2, &facts);
     super::untold(ui, record);

@@ -5,6 +5,7 @@ use nudge_core::recording::{Board, LabelMap, Recording, Settings, inspect};
 use nudge_core::scene::Catalog;
 use nudge_tests::Folder;
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_1_SQRT_2;
 use std::io::Cursor;
 
 const WORDS: [&str; 12] =
@@ -127,7 +128,7 @@ fn mcap(in_chunks: bool) -> Vec<u8> {
         let header = mcap::records::MessageHeader { channel_id, sequence: 0, log_time: 1, publish_time: 1 };
         writer.write_to_known_channel(&header, &data).expect("written");
     };
-    let placed = |message: Message| message.f64s(&[0.0, -0.4, 0.2, -0.707_106_8, 0.0, 0.0, 0.707_106_8]);
+    let placed = |message: Message| message.f64s(&[0.0, -0.4, 0.2, -FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2]);
     let moved = placed(Message::default().u32(1).header("board").text("camera"));
     write("tf2_msgs/msg/TFMessage", "/tf", moved.whole());
     let info = Message::default().header("camera").u32(3).u32(4).text("plumb_bob").u32(0);

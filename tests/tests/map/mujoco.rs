@@ -4,6 +4,7 @@ use super::written::{SCENE, beliefs};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_tests::{Folder, argument, nudge_fails, nudge_ok, root, text, venv_tool};
 use serde_json::{Value, json};
+use std::f32::consts::FRAC_1_SQRT_2;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -88,7 +89,7 @@ fn an_episode_in_mujoco_has_no_truth_pushes_something_and_goes_on_after_a_crash(
 
     // The same view in a world where nothing was done and in one where that push was.
     let camera = json!({ "width": 160, "height": 120, "fx": 108.0, "fy": 108.0, "cx": 79.5, "cy": 59.5 });
-    let quaternion = json!([-0.7071068, 0.0, 0.0, 0.7071068]);
+    let quaternion = json!([-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2]);
     let look = json!({ "view": 0, "position": [0.0, -0.25, 0.15], "quaternion": quaternion, "camera": camera });
     let seen = |done: &[Value]| -> [Vec<u8>; 2] {
         let images = Folder::new();

@@ -7,7 +7,7 @@ use nudge_core::scene::{BACKGROUND, Catalog};
 use nudge_core::{Point, grid::Cell};
 use nudge_tests::{Folder, argument, nudge_ok, root};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A cell that fewer pixels of a label show is of its edge.
 const PIXELS: usize = 3;
@@ -21,7 +21,7 @@ fn recordings() -> Option<PathBuf> {
 }
 
 /// The floor cells that each label's pixels show, with the number of pixels.
-fn visible(recording: &PathBuf) -> BTreeMap<u8, BTreeMap<usize, usize>> {
+fn visible(recording: &Path) -> BTreeMap<u8, BTreeMap<usize, usize>> {
     let board = Board::default();
     let settings = Settings { edge_deg: 0.0, ..Settings::default() };
     let frame = Recording::open(recording, settings).and_then(|recording| recording.frame(0, &board)).expect("a frame");

@@ -1,9 +1,10 @@
 //! Picks: a suction cup takes an object by its front, pulls it straight out of the shelf, and sets it down elsewhere.
 //!
 //! What can be taken is read from the belief alone. The object is a patch of one class on the floor ([`FloorPlan`]) that is
-//! surely there, or the part of one that an object of its class covers (`instances`); its front is what its cells show to the entrance. The cup touches where that front is flat enough over the
-//! cup's circle, and the object can leave where everything before its own outline is believed free (`fronts`). It is set
-//! down where the board is seen free, or beside the robot (`room`). The arm carries it lifted by a centimetre (`carry`).
+//! surely there, or the part of one that an object of its class covers (`instances`); its front is what its cells show to
+//! the entrance. The cup touches where that front is flat enough over the cup's circle, and the object can leave where
+//! everything before its own outline is believed free (`fronts`). It is set down where the board is seen free, or beside
+//! the robot (`room`). The arm carries it lifted by a centimetre (`carry`).
 
 mod carry;
 mod fronts;

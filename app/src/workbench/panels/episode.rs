@@ -5,7 +5,8 @@ use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session, SessionId};
 use nudge_core::camera::{NoiseModel, ViewArray};
-use nudge_core::plan::{Place, PlannerSettings, PolicyKind, SETTINGS, Setting, Values};
+use nudge_core::episode::{EpisodeRecord, StepRecord};
+use nudge_core::plan::{Place, PlannerSettings, PolicyKind, Reason, SETTINGS, Setting, Values};
 use nudge_core::skill::{SkillKind, SkillSet};
 use re_viewer::external::egui;
 use std::collections::BTreeMap;
@@ -71,7 +72,7 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
         ui.label(format!("{} objects, {count} hidden", scene.objects.len())).on_hover_text(words);
     }
     let mut facts = vec![
-        ("policy", config.policy.to_string()),
+        chosen_by(&session.record),
         ("belief", belief_title(&config.belief).to_owned()),
         ("seed", config.seed.to_string()),
         ("budget", format!("{} actions", config.budget)),
@@ -87,6 +88,17 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
             ui.end_row();
         }
     });
+}
+
+/// Who chose the views: the policy, or nobody where the frames of a recording were taken in their own order.
+fn chosen_by(record: &EpisodeRecord) -> (&'static str, String) {
+    let is_unweighed = |step: &StepRecord| step.decision.reason == Reason::Manual;
+    let is_recorded = !record.has_truth() && record.config.views == ViewArray::RECORDED;
+    if is_recorded && !record.steps.is_empty() && record.steps.iter().all(is_unweighed) {
+        ("frames", "in recorded order".to_owned())
+    } else {
+        ("policy", record.config.policy.to_string())
+    }
 }
 
 fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Command>) {

@@ -75,8 +75,8 @@ enum Content {
     Tree(Octree),
     /// Finite points, and how many are not.
     Points(Vec<[f32; 3]>, usize),
-    /// A belief over a grid of its own.
-    Belief(Box<Belief>),
+    /// A belief over a grid of its own, and whether the file tells its voxels.
+    Belief(Box<Belief>, bool),
 }
 
 /// What a map says of a shelf.
@@ -110,7 +110,10 @@ pub fn read_map(path: &Path) -> Result<ForeignMap> {
             let others = points.len() - finite.len();
             Content::Points(finite, others)
         }
-        MapFormat::Archive => Content::Belief(Box::new(archive::read(&bytes, path)?)),
+        MapFormat::Archive => {
+            let (belief, tells_voxel) = archive::read(&bytes, path)?;
+            Content::Belief(Box::new(belief), tells_voxel)
+        }
     };
     Ok(ForeignMap { path: path.to_owned(), content })
 }
@@ -140,7 +143,7 @@ impl ForeignMap {
 
     /// The shelf that the map itself tells; `None` of trees and clouds, which go on and on.
     pub fn shelf(&self) -> Option<Shelf> {
-        let Content::Belief(belief) = &self.content else { return None };
+        let Content::Belief(belief, _) = &self.content else { return None };
         let mut shelf = Shelf::new(belief.grid.size_m());
         shelf.voxel_m = belief.grid.voxel_m;
         Some(shelf)
@@ -158,8 +161,9 @@ impl ForeignMap {
             fail(format!("nothing of it lies in the board's box of {w} x {d} x {h} m; --board tells where that is"))
         };
         match &self.content {
-            Content::Belief(belief) => {
-                if belief.grid.dims != grid.dims || (belief.grid.voxel_m - grid.voxel_m).abs() > 1e-6 {
+            Content::Belief(belief, tells_voxel) => {
+                let is_other_voxel = *tells_voxel && (belief.grid.voxel_m - grid.voxel_m).abs() > 1e-6;
+                if belief.grid.dims != grid.dims || is_other_voxel {
                     let words = |grid: &Grid| {
                         let [w, d, h] = grid.dims;
                         format!("{w} x {d} x {h} voxels of {} m", grid.voxel_m)

@@ -41,7 +41,7 @@ fn far(a: &Belief, b: &Belief) -> [f32; 2] {
 /// each the differences of the beliefs.
 fn beside_classical(sigma_o: PathBuf, sigma_m: PathBuf, scene: &str, budget: usize) -> (usize, [f32; 2]) {
     let catalog = Arc::new(Catalog::standard());
-    let (scene, _) = Scene::load(root().join(scene), &catalog).expect("a scene");
+    let (scene, _) = Scene::load(&root().join(scene), &catalog).expect("a scene");
     let own = cnabu::load_own(Some(&sigma_o), Some(&sigma_m), Arc::new(Classical)).expect("modules");
     let config = |update: &Arc<dyn BeliefUpdate>| EpisodeConfig {
         policy: PolicyKind::RandomPush5,

@@ -90,7 +90,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let mut networks: Vec<(String, NetworksUsed)> = Vec::new();
     for name in args.beliefs.iter().cloned().chain(own::with_own(None)) {
         let update = update_of(&name, args)?;
-        update.check_grid(data.grid())?;
+        update.check_grid(&data.grid())?;
         networks.extend(update.networks_used().map(|used| (name.clone(), used)));
         let progress = Progress::new(format!("{name} on views"), data.len());
         let tallies = evaluate(&data, &*update, &mut |done| progress.at(done))?;

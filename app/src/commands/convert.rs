@@ -170,11 +170,11 @@ pub(super) fn import(
     };
     let frames = Frames::Left;
     let mut driver = match scene {
-        Some(scene) => Driver::start(scene, catalog, config(VIEWS), update, out, overwrite, frames)?,
+        Some(scene) => Driver::start(Episode::new(scene, catalog, config(VIEWS), update)?, out, overwrite, frames)?,
         None => {
             let (scene, config) = (empty(from, board.shelf), config(ViewArray::RECORDED));
             let blank = Box::new(Blank::new(budget));
-            Driver::start_within(blank, scene, catalog, config, update, out, overwrite, frames)?
+            Driver::start(Episode::within(blank, scene, catalog, config, update)?, out, overwrite, frames)?
         }
     };
     let views = driver.episode().views().views.len();

@@ -5,7 +5,7 @@
 //! | `occupancy` | `[W, D, H, 2]` | evidence for occupied and for free per voxel, above 0; ones where nothing is known |
 //! | or `probability` | `[W, D, H]` | probability of being occupied; 0.5 where nothing is known |
 //! | `semantics`, optional | `[W, D, 15]` | Dirichlet over the classes per floor cell, above 0 |
-//! | `voxel_m`, optional | one number | the edge of a voxel, metres; 0.005 if it is not there |
+//! | `voxel_m`, optional | one number | the edge of a voxel, metres; where it is not there that of the shelf, or else 0.005 |
 //!
 //! x is right, y into the shelf, z up, z fastest; float16, float32 or float64, in C order. The beliefs of an episode are
 //! such files.
@@ -23,8 +23,8 @@ const LEAST: f32 = 1e-3;
 /// How far a probability is from 0 and 1 at least.
 const SUREST: f32 = 1e-3;
 
-/// Reads an archive.
-pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Belief> {
+/// Reads an archive: the belief, and whether it tells its voxels.
+pub(super) fn read(bytes: &[u8], path: &Path) -> Result<(Belief, bool)> {
     let fail = |place: &str, words: String| Error::input(path, format!("array {place}"), words);
     let mut archive = OpenArchive::new(bytes, path)?;
     let has_evidence = archive.has("occupancy");
@@ -42,9 +42,10 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Belief> {
     if !voxels.is_some_and(|voxels| (1..=MAX_VOXELS).contains(&voxels)) {
         return Err(fail(name, format!("has shape {shape:?}; 1 to {MAX_VOXELS} voxels are read")));
     }
-    let voxel_m = if archive.has("voxel_m") {
-        let count = archive.shape("voxel_m")?.iter().product();
-        let numbers = if count == 1 { archive.numbers("voxel_m", None)? } else { Vec::new() };
+    let tells_voxel = archive.has("voxel_m");
+    let voxel_m = if tells_voxel {
+        let is_one = archive.shape("voxel_m")?.iter().all(|n| *n == 1);
+        let numbers = if is_one { archive.numbers("voxel_m", None)? } else { Vec::new() };
         let number = numbers.first().copied().filter(|m| (0.001..=0.05).contains(m));
         number.ok_or_else(|| fail("voxel_m", "one number from 0.001 to 0.05 m is needed".to_owned()))?
     } else {
@@ -71,7 +72,7 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<Belief> {
             .map_err(|words| fail("semantics", words))?;
         belief.semantics = numbers.as_chunks().0.to_vec();
     }
-    Ok(belief)
+    Ok((belief, tells_voxel))
 }
 
 fn check(numbers: &[f32], is: impl Fn(f32) -> bool, what: &str) -> std::result::Result<(), String> {

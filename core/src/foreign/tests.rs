@@ -238,7 +238,10 @@ fn archives_with_missing_or_misshapen_arrays_are_told_by_name() {
     let sound = archive(&[("probability", &[4, 6, 3], 0.25), ("voxel_m", &[1], 0.05)]);
     let placed = files.read("a.npz", &sound).expect("reads").belief(&board()).expect("fits");
     assert!((placed.belief.probability(7) - 0.25).abs() < 1e-5);
-    let other = files.read("a.npz", &archive(&[("probability", &[4, 6, 3], 0.5)])).expect("reads");
+    let untold = files.read("a.npz", &archive(&[("probability", &[4, 6, 3], 0.5)])).expect("reads");
+    assert!(untold.belief(&board()).is_ok_and(|placed| placed.belief.grid == board().shelf.grid()));
+    let other = archive(&[("probability", &[4, 6, 3], 0.5), ("voxel_m", &[1], 0.005)]);
+    let other = files.read("a.npz", &other).expect("reads");
     let said = other.belief(&board()).expect_err("another grid").to_string();
     assert!(said.ends_with("has 4 x 6 x 3 voxels of 0.005 m, and the shelf has 4 x 6 x 3 voxels of 0.05 m"), "{said}");
     for (arrays, words) in [

@@ -144,14 +144,15 @@ fn resuming_with_another_module_is_refused_and_with_the_same_under_another_name_
     let scene = folder.write("small.toml", small_scene(TIN));
     let out = folder.name("out");
     let run = ["run", &scene, "--policy", "random", "--budget", "4", "--out", &out];
-    // It ends in the middle: the third look finds what the module does not answer.
+    // It ends in the middle: where a voxel was seen twice, the module answers no numbers any more.
     let line = nudge_fails(2, &[&run[..], &["--sigma-o", &named("late")]].concat());
     assert!(line.contains("late.pt: its semantics holds NaN: evidence is at least 0.001 and finite"), "{line}");
     let done = |out: &str| {
         let document = std::fs::read_to_string(format!("{out}/episode.json")).expect("a document");
         record(&document)["steps"].as_array().expect("steps").len()
     };
-    assert_eq!(done(&out), 2, "what was done before is kept");
+    let kept = done(&out);
+    assert!((1..4).contains(&kept), "what was done before is kept: {kept} steps");
     let resume = |module: &str| [&run[..], &["--resume", "--sigma-o", module]].concat().join("\n");
     let line = nudge_fails(2, &resume(&named("classical_o")).split('\n').collect::<Vec<_>>());
     assert!(line.contains("cannot be resumed: the weights sigma_o were"), "{line}");
@@ -161,7 +162,7 @@ fn resuming_with_another_module_is_refused_and_with_the_same_under_another_name_
     assert!(line.contains("renamed.pt: its semantics holds NaN"), "the same numbers, the same end: {line}");
     let line = nudge_fails(2, &[&run[..], &["--resume", "--belief", "classical"]].concat());
     assert!(line.contains("was run with --belief own+classical, not classical"), "{line}");
-    assert_eq!(done(&out), 2);
+    assert_eq!(done(&out), kept);
 }
 
 #[test]

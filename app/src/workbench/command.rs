@@ -138,6 +138,8 @@ pub enum MenuCommand {
     ZoomOut,
     /// The panels' sizes as at the first start.
     ResetLayout,
+    /// Five things to know of the window.
+    Tour,
     /// The table of shortcuts.
     Shortcuts,
     /// Versions and licences.

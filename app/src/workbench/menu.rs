@@ -61,7 +61,7 @@ pub const MENUS: [(&str, &[Option<M>]); 5] = [
             Some(M::EditScene),
         ],
     ),
-    ("Help", &[Some(M::Shortcuts), Some(M::About)]),
+    ("Help", &[Some(M::Tour), Some(M::Shortcuts), Some(M::About)]),
 ];
 
 impl M {
@@ -104,6 +104,7 @@ impl M {
             M::ZoomIn => "Zoom in",
             M::ZoomOut => "Zoom out",
             M::ResetLayout => "Reset layout",
+            M::Tour => "Tour",
             M::Shortcuts => "Keyboard shortcuts",
             M::About => "About Nudge",
         }
@@ -143,6 +144,7 @@ impl M {
             M::ZoomIn => "Larger text and controls",
             M::ZoomOut => "Smaller text and controls",
             M::ResetLayout => "Panels as wide as at the first start",
+            M::Tour => "Five things to know of this window",
             M::Shortcuts => "Every command that has a key",
             M::About => "Versions and licences",
         }
@@ -188,7 +190,7 @@ impl M {
             M::ZoomOut => command(Key::Minus),
             M::Shortcuts => plain(Key::F1),
             M::EditScene => shifted(Key::D),
-            M::ResetLayout | M::About => None,
+            M::ResetLayout | M::Tour | M::About => None,
         }
     }
 
@@ -212,7 +214,7 @@ impl M {
                 session.is_some() && model.runs_any(|session| session.activity == Activity::Running && !session.pausing)
             }
             M::Cancel => session.is_some() && model.runs_any(Session::can_be_cancelled),
-            M::Branch => session.is_some(),
+            M::Branch | M::Tour => session.is_some(),
             M::EditScene => model.session().is_some(),
             _ => true,
         }

@@ -219,6 +219,8 @@ pub struct Remembered {
     pub recent: Vec<PathBuf>,
     /// Light, where a person asked for it.
     pub light: bool,
+    /// Whether the tour was shown to its end, or skipped.
+    pub toured: bool,
 }
 
 /// Everything that the window shows.

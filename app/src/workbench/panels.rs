@@ -18,6 +18,7 @@ pub mod notes;
 mod photo;
 pub mod push;
 pub mod scenes;
+pub mod tour;
 pub mod why;
 pub mod windows;
 

@@ -153,6 +153,10 @@ impl App {
             MenuCommand::ZoomIn => self.zoom_asked = Some(1.1),
             MenuCommand::ZoomOut => self.zoom_asked = Some(1.0 / 1.1),
             MenuCommand::ResetLayout => self.reset_asked = true,
+            MenuCommand::Tour => {
+                self.lay_out(LayoutKind::Episode);
+                self.tour = Some(0);
+            }
             MenuCommand::Shortcuts => self.dialog = Some(Dialog::Shortcuts),
             MenuCommand::About => self.dialog = Some(Dialog::About),
         }

@@ -5,6 +5,7 @@ use super::App;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
+use crate::workbench::panels::tour::{self, Move, Spot};
 use crate::workbench::panels::{self, Panel};
 use crate::workbench::part::Part;
 use re_viewer::external::re_ui::RecordingCommandKind;
@@ -19,7 +20,8 @@ impl App {
         self.before(&ctx);
         let mut ask = Vec::new();
         egui::Panel::top("menus").show(ui, |ui| self.menus(ui, &mut ask));
-        egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
+        let clock = egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
+        tour::mark(&ctx, Spot::Clock, clock.response.rect);
         let openings: Vec<_> =
             self.openings.iter().map(|(id, opening)| (*id, opening.title.clone(), opening.activity)).collect();
         self.parts.clear();
@@ -117,6 +119,7 @@ impl App {
                         ask.push(Command::Layout(layout));
                     }
                 }
+                tour::mark(ui.ctx(), Spot::Layouts, ui.min_rect());
                 if let Some(port) = self.model.serving {
                     ui.separator();
                     ui.label(format!("● serving 127.0.0.1:{port}")).on_hover_text(format!(
@@ -172,6 +175,7 @@ impl App {
                 }
             });
         self.parts.push((Part::Right, right.response.rect));
+        tour::mark(ui.ctx(), Spot::Right, right.response.rect);
         if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
             let curves = egui::Panel::bottom("curves")
                 .resizable(true)
@@ -202,6 +206,7 @@ impl App {
     fn space_view(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
         let started = Instant::now();
         self.parts.push((Part::Space, ui.available_rect_before_wrap()));
+        tour::mark(ui.ctx(), Spot::Space, ui.available_rect_before_wrap());
         match (&mut self.viewer, frame) {
             (Some(viewer), Some(frame)) => {
                 let (ctx, space) = (ui.ctx().clone(), ui.available_rect_before_wrap());
@@ -240,8 +245,25 @@ impl App {
         {
             self.reply(reply);
         }
+        self.lead(ctx);
         panels::windows::tasks(ctx, self.tasks.under_way(), ask);
         panels::windows::toasts(ctx, &mut self.model.toasts, ask);
+    }
+
+    /// The tour: shown to whoever is new as soon as an episode has something to show.
+    fn lead(&mut self, ctx: &egui::Context) {
+        let is_ready =
+            self.dialog.is_none() && self.model.shows_episode() && self.model.kept.layout == LayoutKind::Episode;
+        let has_steps = self.model.session().is_some_and(|session| session.steps() > 0);
+        if self.is_new && is_ready && has_steps {
+            (self.is_new, self.tour) = (false, Some(0));
+        }
+        let Some(at) = self.tour.filter(|_| is_ready) else { return };
+        match panels::tour::show(ctx, at, |spot| tour::marked(ctx, spot)) {
+            Some(Move::To(stop)) => self.tour = Some(stop),
+            Some(Move::End) => (self.tour, self.model.kept.toured) = (None, true),
+            None => (),
+        }
     }
 
     /// The recording that is looked at, and its clock.

@@ -1,5 +1,6 @@
 //! The window: takes in what workers, jobs and the viewer tell, draws the panels, and carries out what they ask.
 
+mod around;
 mod carry_out;
 mod draw;
 mod files;

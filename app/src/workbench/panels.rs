@@ -16,6 +16,7 @@ pub mod maps;
 pub mod notes;
 #[cfg(test)]
 mod photo;
+pub mod promises;
 pub mod push;
 pub mod scenes;
 pub mod tour;

@@ -11,7 +11,7 @@ use std::path::Path;
 
 mod header;
 
-/// Most properties of an element, bytes of a list, and elements are bounded by the file; this bounds what a line may claim.
+/// The most points that are read.
 const MOST_POINTS: usize = 40_000_000;
 
 /// The points of a file, in its own frame; those that are no numbers too.

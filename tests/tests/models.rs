@@ -73,7 +73,7 @@ fn the_classical_update_as_modules_agrees_with_the_classical_belief() {
     let (pushes, [probability, evidence]) =
         beside_classical(module("classical_o"), module("classical_m"), "scenes/demo/first-look.toml", 13);
     println!("{pushes} pushes, probabilities {probability:.1e}, evidence {evidence:.1e}");
-    assert!(pushes >= 2, "an episode without pushes shows nothing of sigma_m");
+    assert!(pushes >= 1, "an episode without pushes shows nothing of sigma_m");
     assert!(probability < 1e-4 && evidence < 1e-4, "probabilities {probability}, evidence {evidence}");
 }
 

@@ -18,6 +18,7 @@ LOADED_S = 8 / 240
 # Points of the rim that have to meet the object, and how far behind it their rays begin, metres.
 RIM_POINTS = 16
 BEHIND_M = 0.03
+EQUALITY = int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
 
 # What the cup meets: nothing that holds, or more than the bellows gives way. A number is that of the object it seals on.
 OPEN = "open"
@@ -76,7 +77,7 @@ class Cup:
         if self.held is None:
             return 0.0, 0.0
         weld, body = model.equality(f"cup{self.held}").id, model.body(f"object{self.held}").id
-        rows = (data.efc_type == mujoco.mjtConstraint.mjCNSTR_EQUALITY) & (data.efc_id == weld)
+        rows = (data.efc_type == EQUALITY) & (data.efc_id == weld)
         push = np.zeros(model.nv)
         mujoco.mj_mulJacTVec(model, data, push, np.where(rows, data.efc_force, 0.0))
         # A free body's force is along the world's axes and acts at its origin; its moment is along its own axes.

@@ -1,5 +1,6 @@
 //! The episode at the left: its scene, how it is run, what can be done next, and the other open episodes.
 
+use super::tour;
 use crate::driver::{BELIEFS, belief_title, belief_update};
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
@@ -103,6 +104,7 @@ fn chosen_by(record: &EpisodeRecord) -> (&'static str, String) {
 
 fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Command>) {
     super::framed(ui);
+    let top = ui.cursor().min;
     // While it runs, the button that began the run pauses it.
     let runs = session.activity == Activity::Running;
     let run = if runs { MenuCommand::Pause } else { MenuCommand::Run };
@@ -117,6 +119,8 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
             }
         });
     }
+    let bottom = egui::pos2(ui.max_rect().right(), ui.cursor().top());
+    tour::mark(ui.ctx(), tour::Spot::Doing, egui::Rect::from_min_max(top, bottom).expand(3.0));
     let (steps, budget) = (session.steps(), session.record.config.budget);
     let doing = match session.activity {
         Activity::Idle if session.is_finished() => "the budget is used up",

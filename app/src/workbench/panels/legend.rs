@@ -88,9 +88,8 @@ pub fn line(ui: &mut Ui, rgb: Rgb, name: &str, value: &str) -> Response {
     let [sample, gap] = [14.0, 5.0];
     let (text, ink) = (ui.visuals().text_color(), line_ink(ui, rgb));
     let strong = ui.visuals().strong_text_color();
-    let digits = FontId::monospace(small(ui).size);
     let name_drawn = ui.painter().layout_no_wrap(name.to_owned(), small(ui), text);
-    let value_drawn = ui.painter().layout_no_wrap(value.to_owned(), digits, strong);
+    let value_drawn = ui.painter().layout_no_wrap(value.to_owned(), small(ui), strong);
     let (name_px, value_px) = (name_drawn.size(), value_drawn.size());
     let size = vec2(sample + gap + name_px.x + gap + value_px.x, name_px.y.max(value_px.y));
     let (rect, response) = ui.allocate_exact_size(size, Sense::hover());

@@ -126,7 +126,7 @@ fn a_pick_in_mujoco_takes_the_object_out_of_the_shelf_and_finds_no_seal_where_it
     let folder = Folder::new();
     let (scene, out, truth) = (folder.write("small.toml", SCENE), folder.name("out"), folder.name("truth.jsonl"));
     let command = format!("{} --truth {truth}", world.command());
-    let settings = ["--policy", "random-pick-5", "--place", "tray", "--belief", "classical", "--budget", "5"];
+    let settings = ["--policy", "random-pick-5", "--place", "tray", "--belief", "classical", "--budget", "6"];
     let run = ["run", &scene, "--world", &command, "--out", &out, "--world-timeout", "120"];
     nudge_ok(&[&run[..], &settings].concat());
     let read = |path: PathBuf| text(&std::fs::read(path).expect("a file"));

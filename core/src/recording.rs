@@ -22,6 +22,7 @@ mod find_board;
 mod flying;
 mod folder;
 mod image;
+mod joints;
 mod labels;
 mod mcap_file;
 mod nerf;

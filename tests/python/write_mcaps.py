@@ -8,7 +8,7 @@ FRAMES is as for write_recordings.py. OUT gets
     chain.mcap        the same with an arm between board and camera, and axes of a body; lz4 chunks
     png-lz4.mcap      mcap-ros2-support: compressedDepth as PNG (16UC1), labels as PNG, PoseStamped; lz4 chunks
     rvl-none.mcap     mcap-ros2-support: compressedDepth as RVL, PoseStamped; no compression
-    rosbags.mcap      rosbags: Image 32FC1, labels mono16, PoseStamped
+    rosbags.mcap      rosbags: Image 32FC1, labels mono16, PoseStamped, and the arm's joints (JointState), last one first
     no-info.mcap      no CameraInfo
     npy-1000          the depth of whole millimetres as a plain folder of float32
 """
@@ -257,6 +257,7 @@ def main(source, out):
             "/labels": "sensor_msgs/msg/Image",
             "/camera/camera_info": "sensor_msgs/msg/CameraInfo",
             "/camera_pose": "geometry_msgs/msg/PoseStamped",
+            "/joint_states": "sensor_msgs/msg/JointState",
         }
         connections = {topic: bag.add_connection(topic, kind, typestore=store) for topic, kind in kinds.items()}
         for at, frame in enumerate(frames):
@@ -286,6 +287,13 @@ def main(source, out):
             turn = types["geometry_msgs/msg/Quaternion"](**xyzw(frame["quaternion"]))
             pose = types["geometry_msgs/msg/Pose"](position=point, orientation=turn)
             write("/camera_pose", types["geometry_msgs/msg/PoseStamped"](header=ros_header(at), pose=pose))
+            if frame["joints"]:
+                names, numbers = ["finger", *reversed(camera["joints"])], [0.8, *reversed(frame["joints"])]
+                none = np.zeros(0)
+                state = types["sensor_msgs/msg/JointState"](
+                    header=ros_header(at), name=names, position=np.array(numbers), velocity=none, effort=none
+                )
+                write("/joint_states", state)
     shutil.move(next((out / "bag").glob("*.mcap")), out / "rosbags.mcap")
 
     folder = out / "npy-1000"

@@ -1,5 +1,6 @@
 //! What is on the topics of an MCAP file of ROS 2, without its images.
 
+use super::joints::JointPositions;
 use super::mcap_file::{Address, scan};
 use super::ros::{self, CameraInfo, Placed};
 use super::transforms::Tree;
@@ -18,6 +19,7 @@ pub(super) struct Topic {
     pub(super) encoding: String,
     pub(super) info: Option<CameraInfo>,
     pub(super) poses: BTreeMap<i64, Placed>,
+    pub(super) joints: BTreeMap<i64, JointPositions>,
 }
 
 /// What is in a file, without its images.
@@ -119,6 +121,10 @@ impl Topic {
             "PoseStamped" => {
                 let (header, placed) = ros::pose_stamped(message)?;
                 self.poses.insert(header.time_ns, placed);
+            }
+            "JointState" => {
+                let (header, positions) = ros::joint_state(message)?;
+                self.joints.insert(header.time_ns, positions);
             }
             "TFMessage" => {
                 let is_fixed = address.topic.ends_with("tf_static");

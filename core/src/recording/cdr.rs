@@ -76,6 +76,15 @@ impl<'a> Cdr<'a> {
         self.take(length)
     }
 
+    /// A sequence of strings.
+    pub(super) fn strings(&mut self) -> Result<Vec<String>, String> {
+        let length = self.u32()? as usize;
+        if length > self.bytes.len() / 4 {
+            return Err(SHORT.to_owned());
+        }
+        (0..length).map(|_| self.string()).collect()
+    }
+
     /// A sequence of numbers.
     pub(super) fn f64_sequence(&mut self) -> Result<Vec<f64>, String> {
         let length = self.u32()? as usize;
@@ -104,6 +113,7 @@ mod tests {
         let long = [0, 1, 0, 0, 0xff, 0xff, 0xff, 0xff];
         assert!(Cdr::new(&long).expect("plain").bytes().is_err());
         assert!(Cdr::new(&long).expect("plain").f64_sequence().is_err());
+        assert!(Cdr::new(&long).expect("plain").strings().is_err());
         assert!(Cdr::new(&[0, 7, 0, 0]).is_err() && Cdr::new(&[0]).is_err());
     }
 }

@@ -58,6 +58,14 @@ pub(super) fn pose_stamped(message: &[u8]) -> Result<(Header, Placed), String> {
     Ok((header, Placed { position: cdr.f64s()?, quaternion: cdr.f64s()? }))
 }
 
+/// The positions of the joints that a `JointState` names; of a joint without one nothing.
+pub(super) fn joint_state(message: &[u8]) -> Result<(Header, Vec<(String, f64)>), String> {
+    let mut cdr = Cdr::new(message)?;
+    let header = header(&mut cdr)?;
+    let (names, positions) = (cdr.strings()?, cdr.f64_sequence()?);
+    Ok((header, names.into_iter().zip(positions).collect()))
+}
+
 /// The transforms of a `TFMessage`: header with the parent's frame, the child's frame, and where the child is in the parent.
 pub(super) fn transforms(message: &[u8]) -> Result<Vec<(Header, String, Placed)>, String> {
     let mut cdr = Cdr::new(message)?;

@@ -4,6 +4,7 @@ use super::Settings;
 use super::bag::{Bag, Topic};
 use super::entry::{Depth, Entry, Found, Labels, Place};
 use super::folder::pinhole;
+use super::joints::Holder;
 use super::mcap_file::Address;
 use super::ros::CameraInfo;
 use super::topics::{Axes, Topics};
@@ -82,6 +83,12 @@ pub(super) fn list(path: &Path, settings: &Settings) -> Result<Found> {
     if let Some(name) = topics.pose.as_ref().filter(|name| of(name).is_none_or(|topic| topic.poses.is_empty())) {
         return Err(missing("PoseStamped", name));
     }
+    if let Some(name) = topics.joints.as_ref().filter(|name| of(name).is_none_or(|topic| topic.joints.is_empty())) {
+        return Err(missing("JointState", name));
+    }
+    let file = settings.topics.as_deref().unwrap_or(path);
+    let holder =
+        topics.robot.as_ref().map(|robot| Holder::read(robot, topics.camera_link.as_deref(), file)).transpose()?;
     let tolerance_s = topics.tolerance_s.unwrap_or(settings.tolerance_s);
     let first_ns = depth.images.iter().map(|(time_ns, ..)| *time_ns).min().unwrap_or(0);
     let place = |topic: &str, address: &Address| Place::Message {
@@ -93,7 +100,8 @@ pub(super) fn list(path: &Path, settings: &Settings) -> Result<Found> {
         Entry {
             name: format!("{number:03}"),
             time_s: Some((time_ns - first_ns) as f64 * 1e-9),
-            pose: pose(&bag, &topics, frame, *time_ns, tolerance_s).map(|pose| turned(pose, topics.axes)),
+            pose: pose(&bag, &topics, holder.as_ref(), frame, *time_ns, tolerance_s)
+                .map(|pose| turned(pose, topics.axes)),
             camera,
             depth: Ok(Depth { place: place(&topics.depth, address), unit_m: topics.depth_unit_m.unwrap_or(0.001) }),
             labels: label.map_or(Labels::None, |(name, address)| Labels::Image(place(name, address))),
@@ -103,7 +111,17 @@ pub(super) fn list(path: &Path, settings: &Settings) -> Result<Found> {
 }
 
 /// The camera's pose at a time, as `topics` say where to find it.
-fn pose(bag: &Bag, topics: &Topics, frame: &str, time_ns: i64, tolerance_s: f64) -> std::result::Result<Pose, String> {
+fn pose(
+    bag: &Bag,
+    topics: &Topics,
+    holder: Option<&Holder>,
+    frame: &str,
+    time_ns: i64,
+    tolerance_s: f64,
+) -> std::result::Result<Pose, String> {
+    if let Some((holder, states)) = holder.zip(topics.joints.as_ref().and_then(|name| bag.topics.get(name))) {
+        return holder.pose(&states.joints, time_ns, tolerance_s);
+    }
     if let Some(poses) = topics.pose.as_ref().and_then(|name| bag.topics.get(name)) {
         return single(nearest(&poses.poses, time_ns, tolerance_s)?);
     }

@@ -8,6 +8,9 @@
 //! fixed_frame = "world"                                # poses from /tf and /tf_static: where this frame is ...
 //! camera_frame = "camera_color_optical_frame"          # ... from this one; else the depth images' own
 //! # pose = "/camera_pose"                              # or poses from a topic of PoseStamped
+//! # joints = "/joint_states"                           # or from a topic of JointState, through the arm's URDF:
+//! # robot = "my_arm.urdf"                              # a file beside this one, or gripper or suction
+//! # camera_link = "camera_optical"                     # the camera's link there; else the usual names
 //! axes = "optical"                                     # optical (z forward) or body (x forward) axes of that frame
 //! tolerance_s = 0.02                                   # how far times may be apart
 //! depth_unit_m = 0.001                                 # metres per unit of depth images of whole numbers
@@ -42,6 +45,9 @@ pub(super) struct Topics {
     pub(super) fixed_frame: Option<String>,
     pub(super) camera_frame: Option<String>,
     pub(super) pose: Option<String>,
+    pub(super) joints: Option<String>,
+    pub(super) robot: Option<String>,
+    pub(super) camera_link: Option<String>,
     #[serde(default)]
     pub(super) axes: Axes,
     pub(super) tolerance_s: Option<f64>,
@@ -66,11 +72,14 @@ impl Topics {
         if let Some(metres) = topics.depth_unit_m.filter(|m| !(m.is_finite() && *m > 0.0)) {
             return fail("depth_unit_m", format!("is {metres}, not a number of metres above 0"));
         }
-        if topics.pose.is_some() == topics.fixed_frame.is_some() {
-            return fail(
-                "",
-                "either fixed_frame (poses from /tf) or pose (a topic of PoseStamped) must be given".to_owned(),
-            );
+        let sources = [&topics.fixed_frame, &topics.pose, &topics.joints];
+        if sources.into_iter().filter(|source| source.is_some()).count() != 1 {
+            let words = "either fixed_frame (poses from /tf), pose (a topic of PoseStamped) or joints (a topic of JointState) \
+                         must be given, and one of them only";
+            return fail("", words.to_owned());
+        }
+        if topics.joints.is_some() != topics.robot.is_some() {
+            return fail("robot", "the arm's URDF file belongs to joints, and joints to it".to_owned());
         }
         Ok(topics)
     }
@@ -102,6 +111,9 @@ impl Topics {
             fixed_frame,
             camera_frame,
             pose,
+            joints: None,
+            robot: None,
+            camera_link: None,
             axes: Axes::Optical,
             tolerance_s: None,
             depth_unit_m: None,
@@ -122,6 +134,9 @@ impl Topics {
         line("fixed_frame", self.fixed_frame.as_ref(), "poses are in this frame of /tf");
         line("camera_frame", self.camera_frame.as_ref(), "the camera's frame");
         line("pose", self.pose.as_ref(), "poses of the camera");
+        line("joints", self.joints.as_ref(), "joints of the arm that holds the camera");
+        line("robot", self.robot.as_ref(), "that arm's URDF file");
+        line("camera_link", self.camera_link.as_ref(), "the camera's link there");
         let axes = if self.axes == Axes::Optical { "optical" } else { "body" };
         line("axes", Some(&axes.to_owned()), "optical: z forward; body: x forward");
         text += &format!("tolerance_s = {}\n", self.tolerance_s.unwrap_or(0.02));
@@ -152,6 +167,8 @@ mod tests {
             ("format = 1", "format = 2", "topics.toml: format: is 2"),
             ("depth", "deph", "topics.toml: line 2: unknown field"),
             ("fixed_frame = \"world\"", "", "topics.toml: either fixed_frame"),
+            ("axes", "pose = \"/p\"\naxes", "topics.toml: either fixed_frame"),
+            ("fixed_frame = \"world\"", "joints = \"/j\"", "topics.toml: robot: the arm's URDF"),
             ("\"body\"", "\"body\"\ntolerance_s = -1.0", "topics.toml: tolerance_s: is -1"),
             ("\"body\"", "\"body\"\ndepth_unit_m = 0.0", "topics.toml: depth_unit_m: is 0"),
             ("\"body\"", "\"odd\"", "topics.toml: line 5: unknown variant"),

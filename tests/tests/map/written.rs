@@ -1,8 +1,10 @@
 //! Recordings of a simulated shelf, written by a Python program that shares no code with Nudge.
 
+use nudge_core::arm::ArmTool;
 use nudge_core::belief::Belief;
 use nudge_core::camera::PixelClasses;
 use nudge_core::episode::{EpisodeDir, Told};
+use nudge_core::plan::Action;
 use nudge_tests::{Folder, argument, nudge_ok, root, venv_tool};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -79,6 +81,8 @@ pub fn beliefs(path: &Path) -> Vec<Belief> {
 fn write_frames(episode: &Path, out: &Path) {
     let directory = EpisodeDir::open(episode).expect("opens");
     let record = directory.record().expect("a record");
+    let arm = ArmTool::standard(record.scene.shelf);
+    let hands = record.view_array().expect("views").hand_poses(&arm);
     let (mut frames, mut camera) = (Vec::new(), json!({}));
     for (at, step) in record.steps.iter().enumerate() {
         let Told::Frame(sensed) = directory.read_told(step).expect("a frame") else { panic!("only looks") };
@@ -88,12 +92,16 @@ fn write_frames(episode: &Path, out: &Path) {
         std::fs::write(out.join(format!("{at:03}.depth")), depth).expect("written");
         std::fs::write(out.join(format!("{at:03}.label")), labels).expect("written");
         let (q, t) = (pose.rotation, pose.translation);
-        frames.push(json!({ "position": [t.x, t.y, t.z], "quaternion": [q.i, q.j, q.k, q.w] }));
+        let Action::Look { view } = step.action else { panic!("only looks") };
+        let joints = hands[usize::from(view.0)].as_ref().map(|hand| hand.joints().to_vec());
+        let placed = json!({ "position": [t.x, t.y, t.z], "quaternion": [q.i, q.j, q.k, q.w], "joints": joints });
+        frames.push(placed);
         let c = frame.intrinsics();
         let ([fx, fy], [cx, cy]) = (c.focal_px, c.principal_px);
         camera = json!({ "width": c.width, "height": c.height, "fx": fx, "fy": fy, "cx": cx, "cy": cy });
     }
     camera["frames"] = frames.into();
+    camera["joints"] = arm.arm.joints.iter().map(|joint| joint.name.clone()).collect();
     std::fs::write(out.join("frames.json"), camera.to_string()).expect("written");
 }
 

@@ -1,13 +1,16 @@
 //! The command line: one file per subcommand.
 
+use crate::driver::own::{self, OwnFiles};
 use crate::planner_args::PlannerArgs;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 mod bench;
 mod calibrate;
+mod convert;
 mod data;
 mod doctor;
 mod manual;
@@ -61,6 +64,8 @@ enum Command {
     Run(run::Args),
     /// Map a recording that a real camera or another program made, and write the episode
     Map(map::Args),
+    /// Turn maps of other programs into episodes, and beliefs into maps for other programs
+    Convert(convert::Args),
     /// Run policies on sets of scenes, and put shards of that together
     Bench(bench::Args),
     /// Re-run an episode from its log and verify every step
@@ -133,6 +138,7 @@ pub fn main() -> ExitCode {
         None => Ok(()),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Map(args)) => map::run(&args),
+        Some(Command::Convert(args)) => convert::run(&args),
         Some(Command::Bench(args)) => bench::run(&args),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Probe(args)) => probe::run(&args),
@@ -175,9 +181,33 @@ fn to_json(document: &impl Serialize) -> anyhow::Result<String> {
     Ok(serde_json::to_string_pretty(document)? + "\n")
 }
 
-/// Where the networks run.
+/// Modules of the user's own.
+#[derive(clap::Args, Debug, Default)]
+pub struct OwnArgs {
+    /// A TorchScript module of your own that updates the belief after a look, in place of sigma_o; what no module does, the
+    /// classical update does, or the one that --belief names
+    #[arg(long, value_name = "FILE.pt")]
+    sigma_o: Option<PathBuf>,
+    /// A TorchScript module of your own that predicts what a manipulation leaves, in place of sigma_m
+    #[arg(long, value_name = "FILE.pt")]
+    sigma_m: Option<PathBuf>,
+}
+
+impl OwnArgs {
+    fn choose(&self) -> nudge_core::Result<()> {
+        for file in [&self.sigma_o, &self.sigma_m].into_iter().flatten() {
+            std::fs::metadata(file).map_err(|error| nudge_core::Error::io(file, error))?;
+        }
+        own::choose(OwnFiles { sigma_o: self.sigma_o.clone(), sigma_m: self.sigma_m.clone() });
+        Ok(())
+    }
+}
+
+/// What the networks are, where they are not those that came with the program, and where they run.
 #[derive(clap::Args, Debug)]
 struct DeviceArgs {
+    #[command(flatten)]
+    own: OwnArgs,
     /// Device of the networks: auto (CUDA when it is there), cpu or cuda [default: $NUDGE_DEVICE, or auto]
     #[arg(long, value_name = "auto|cpu|cuda")]
     device: Option<String>,
@@ -185,6 +215,7 @@ struct DeviceArgs {
 
 impl DeviceArgs {
     fn choose(&self) -> nudge_core::Result<()> {
+        self.own.choose()?;
         self.device.as_deref().map_or(Ok(()), nudge_core::cnabu::choose_device)
     }
 }
@@ -206,6 +237,13 @@ struct PlanningArgs {
     noise: String,
     #[command(flatten)]
     planner: PlannerArgs,
+}
+
+impl PlanningArgs {
+    /// The belief update that was asked for, after the device was chosen.
+    fn belief(&self) -> Option<String> {
+        own::with_own(self.belief.as_deref())
+    }
 }
 
 /// What to say when networks are asked for in a build without them.

@@ -8,7 +8,7 @@ use crate::figure::{Moment, Summary, summary};
 use crate::made_by;
 use crate::picture::{self, RgbImage};
 use crate::record::Recorder;
-use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical};
+use nudge_core::belief::{Belief, BeliefUpdate, CLASSICAL, CNABU, Classical, mixed_parts};
 use nudge_core::camera::hidden_objects;
 use nudge_core::cnabu;
 use nudge_core::environment::Environment;
@@ -17,6 +17,7 @@ use nudge_core::episode::{
     resume_within,
 };
 use nudge_core::files::{remove_if_there, temporary_of};
+use nudge_core::foreign::CONVERTED;
 use nudge_core::plan::{Decision, PolicyKind};
 use nudge_core::scene::{Body, Catalog, ObjectId, Scene};
 use nudge_core::world::TruthMap;
@@ -24,6 +25,8 @@ use nudge_core::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
+
+pub mod own;
 
 /// File of the recording in an episode's directory.
 pub const RECORDING: &str = "episode.rrd";
@@ -251,7 +254,7 @@ impl Driver {
     }
 }
 
-/// The names of the belief updates.
+/// The names of the belief updates that come with the program.
 pub const BELIEFS: [&str; 2] = [CLASSICAL, CNABU];
 
 /// The belief update that a policy runs with: the one named, or the policy's own. No other one ever stands in for it.
@@ -277,7 +280,11 @@ pub fn update_of(name: &str) -> Result<std::result::Result<Arc<dyn BeliefUpdate>
             Err(NoNetworks::Broken(error)) => Err(error),
             Err(NoNetworks::Missing(why)) => Ok(Err(why)),
         },
-        other => Err(Error::Usage(format!("unknown belief \"{other}\"; there are classical, cnabu"))),
+        CONVERTED => Ok(Err("its beliefs were converted from files, so no update makes them")),
+        other => match mixed_parts(other) {
+            Some(parts) => own::update(parts),
+            None => Err(Error::Usage(format!("unknown belief \"{other}\"; there are classical, cnabu"))),
+        },
     }
 }
 
@@ -321,9 +328,19 @@ pub fn default_out(scene: &Scene, policy: PolicyKind, seed: u64) -> PathBuf {
 /// The belief update that a policy runs with unless another is asked for, as far as this program has it.
 #[cfg(feature = "workbench")]
 pub fn default_belief(policy: PolicyKind) -> &'static str {
+    if let Some(name) = own_belief() {
+        return name;
+    }
     let own = policy.default_belief();
     let is_here = own != CNABU || (cnabu::AVAILABLE && cnabu::models_dir().is_some());
     if is_here { own } else { CLASSICAL }
+}
+
+/// The belief update with the modules of the user's own, if there are any.
+#[cfg(feature = "workbench")]
+pub fn own_belief() -> Option<&'static str> {
+    static NAME: OnceLock<Option<String>> = OnceLock::new();
+    NAME.get_or_init(|| own::with_own(None)).as_deref()
 }
 
 /// A belief update's name for people.

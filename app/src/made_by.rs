@@ -1,6 +1,6 @@
 //! This program as a maker of numbers, and what made numbers in words.
 
-use nudge_core::belief::Weights;
+use nudge_core::belief::{ModuleFiles, Weights};
 use nudge_core::made_by::{Build, MadeBy, UNKNOWN};
 use nudge_core::plan::SETTINGS;
 
@@ -21,11 +21,8 @@ pub fn facts(made_by: &MadeBy) -> Vec<(&'static str, String)> {
     };
     let mut facts =
         vec![("program", format!("nudge {}, {commit}", made_by.version)), ("method", made_by.method.clone())];
-    if let Some(Weights { sigma_o, sigma_m, change_temperature }) = &made_by.weights {
-        let hash = |hash: &Option<String>| hash.clone().unwrap_or_else(|| "absent".to_owned());
-        let temperature = change_temperature.map_or(String::new(), |value| format!(", temperature {value}"));
-        facts.push(("sigma_o", hash(sigma_o)));
-        facts.push(("sigma_m", hash(sigma_m) + &temperature));
+    if let Some(weights) = &made_by.weights {
+        facts.extend(networks(weights, made_by.modules.as_ref()));
     }
     if let Some(libtorch) = &made_by.libtorch {
         let device = made_by.device.as_deref().map_or(String::new(), |device| format!(" on {device}"));
@@ -35,6 +32,20 @@ pub fn facts(made_by: &MadeBy) -> Vec<(&'static str, String)> {
     let settings = SETTINGS.iter().map(|setting| format!("{} {}", setting.name, setting.value(&made_by.planner)));
     facts.push(("settings", settings.collect::<Vec<_>>().join(", ")));
     facts
+}
+
+/// sigma_o and sigma_m: the hashes of their files, and the names of those that are the user's own.
+pub fn networks(weights: &Weights, modules: Option<&ModuleFiles>) -> [(&'static str, String); 2] {
+    let Weights { sigma_o, sigma_m, change_temperature } = weights;
+    let temperature = change_temperature.map_or(String::new(), |value| format!(", temperature {value}"));
+    let words = |hash: &Option<String>, file: Option<&String>| {
+        let hash = hash.clone().unwrap_or_else(|| "absent".to_owned());
+        file.map_or(hash.clone(), |file| format!("{hash}, {file}"))
+    };
+    [
+        ("sigma_o", words(sigma_o, modules.and_then(|modules| modules.sigma_o.as_ref()))),
+        ("sigma_m", words(sigma_m, modules.and_then(|modules| modules.sigma_m.as_ref())) + &temperature),
+    ]
 }
 
 #[cfg(test)]
@@ -66,10 +77,11 @@ mod tests {
         let (one, other) = ("b".repeat(64), "c".repeat(64));
         made_by.weights =
             Some(Weights { sigma_o: Some(one.clone()), sigma_m: Some(other.clone()), change_temperature: None });
+        made_by.modules = Some(ModuleFiles { sigma_o: Some("mine.pt".to_owned()), sigma_m: None });
         (made_by.libtorch, made_by.device) = (Some("2.13.0".to_owned()), Some("cpu".to_owned()));
         made_by.commit = UNKNOWN.to_owned();
         let words = told(&made_by);
-        for part in [&*one, &*other, "libtorch: 2.13.0 on cpu", "commit unknown"] {
+        for part in [&*one, &*other, "libtorch: 2.13.0 on cpu", "commit unknown", ", mine.pt\n"] {
             assert_eq!(words.matches(part).count(), 1, "{part}: {words}");
         }
     }

@@ -8,6 +8,7 @@ mod classical;
 mod floor;
 mod held;
 mod intervention;
+mod mixed;
 mod networks;
 mod sightings;
 
@@ -17,7 +18,8 @@ pub(crate) use intervention::Met;
 #[cfg(feature = "cnabu")]
 pub(crate) use intervention::Moved;
 pub use intervention::{Flow, Intervention, SOLID, Stroke};
-pub use networks::{NetworksUsed, Weights, short};
+pub use mixed::{OWN, mixed_name, mixed_parts, observes_with_networks};
+pub use networks::{ModuleFiles, NetworksUsed, Weights, short};
 pub use sightings::{CHANGED, LOOKS_TAKEN, NEWS_REACH_M, Sightings, look};
 
 use crate::camera::MapObservation;
@@ -205,7 +207,7 @@ pub const CNABU: &str = "cnabu";
 
 /// How a belief changes with an observation (sigma_o) and how it is predicted to change with a manipulation (sigma_m).
 pub trait BeliefUpdate: Send + Sync {
-    /// Name in episodes and reports: [`CLASSICAL`], [`CNABU`].
+    /// Name in episodes and reports: [`CLASSICAL`], [`CNABU`], or one of [`mixed_name`].
     fn name(&self) -> &str;
 
     /// Whether beliefs over `grid` can be updated.
@@ -224,6 +226,12 @@ pub trait BeliefUpdate: Send + Sync {
 
     /// The networks that it runs on; `None` for an update without any.
     fn networks_used(&self) -> Option<NetworksUsed> {
+        None
+    }
+
+    /// What went wrong in an update, if anything did: from then on nothing that it answers counts, and whoever asked it
+    /// ends with this error.
+    fn fault(&self) -> Option<crate::Error> {
         None
     }
 

@@ -11,9 +11,13 @@ mod layout;
 #[cfg(feature = "cnabu")]
 mod loss;
 #[cfg(feature = "cnabu")]
+mod module;
+#[cfg(feature = "cnabu")]
 mod net;
 #[cfg(feature = "cnabu")]
 mod observe_net;
+#[cfg(feature = "cnabu")]
+mod own;
 #[cfg(feature = "cnabu")]
 mod pool;
 #[cfg(feature = "cnabu")]
@@ -160,6 +164,35 @@ pub fn half(tensor: &Tensor) -> Tensor {
 #[cfg(feature = "cnabu")]
 pub fn load(directory: &Path) -> Result<Arc<dyn BeliefUpdate>> {
     Ok(Arc::new(Cnabu::load(directory)?))
+}
+
+/// TorchScript modules of the user's own in place of sigma_o, sigma_m or both; `rest` does what is not given. What a module
+/// is given and has to answer is told in `cnabu/own.rs` and in docs/bring-your-own.md.
+///
+/// # Errors
+/// In a build without networks; for a file that is missing or no TorchScript module. What a module answers is checked by
+/// [`BeliefUpdate::check_grid`].
+#[cfg(feature = "cnabu")]
+pub fn load_own(
+    sigma_o: Option<&Path>,
+    sigma_m: Option<&Path>,
+    rest: Arc<dyn BeliefUpdate>,
+) -> Result<Arc<dyn BeliefUpdate>> {
+    Ok(Arc::new(own::Own::load(sigma_o, sigma_m, rest, chosen_device()?)?))
+}
+
+/// Modules of the user's own: not in this build.
+///
+/// # Errors
+/// Always.
+#[cfg(not(feature = "cnabu"))]
+pub fn load_own(
+    _sigma_o: Option<&Path>,
+    _sigma_m: Option<&Path>,
+    rest: Arc<dyn BeliefUpdate>,
+) -> Result<Arc<dyn BeliefUpdate>> {
+    drop(rest);
+    Err(crate::Error::Usage("this program was built without networks".to_owned()))
 }
 
 /// sigma_o alone with its weights in `directory`, to score observations.

@@ -32,6 +32,7 @@ pub use filed::{Observer, resume_within};
 pub use infer::infer;
 pub use judgement::{Judgement, NO_TRUTH, Prior};
 pub use machine::Episode;
+pub(crate) use npz::{Archive, OpenArchive};
 pub use npz::{Precision, StoredTruth};
 pub use record::{
     EpisodeConfig, EpisodeRecord, FORMAT, GripReport, LaterMaker, LinkTouch, PushReport, StepOutcome, StepRecord,

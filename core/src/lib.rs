@@ -3,7 +3,7 @@
 //! Data walks through the modules once, in this order, and every module depends only on the ones before it:
 //!
 //! ```text
-//! grid -> solid -> scene -> arm -> world -> camera -> recording -> environment -> belief -> cnabu -> gain -> skill -> plan -> made_by -> score -> episode -> probe -> learn
+//! grid -> solid -> scene -> arm -> world -> camera -> recording -> environment -> belief -> cnabu -> gain -> skill -> plan -> made_by -> score -> episode -> foreign -> probe -> learn
 //! ```
 //!
 //! Beside them stand what all of them may use: [`error`], [`files`], [`places`], [`rng`], [`shard`] and [`wall`].
@@ -20,6 +20,7 @@ pub mod episode;
 pub mod error;
 pub mod files;
 mod fixed;
+pub mod foreign;
 pub mod gain;
 pub mod grid;
 pub mod learn;

@@ -9,7 +9,7 @@
 //!   threads does not, since results do not depend on it, and neither does whether the checkout had changes.
 //! * **Which of several makers made this result?** [`MadeBy::fingerprint`] stands in each result of a bench.
 
-use crate::belief::{NetworksUsed, Weights, short};
+use crate::belief::{ModuleFiles, NetworksUsed, Weights, short};
 use crate::files::sha256;
 use crate::plan::{PlannerSettings, SETTINGS};
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,9 @@ pub struct MadeBy {
     /// The networks' weights; not there for the classical belief, and neither are the next two.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub weights: Option<Weights>,
+    /// The files of modules of the user's own that stood in for networks.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub modules: Option<ModuleFiles>,
     /// Version of libtorch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub libtorch: Option<String>,
@@ -72,15 +75,18 @@ impl MadeBy {
     /// What this program makes with these networks (none for the classical belief) and settings on so many threads.
     pub fn new(build: Build, networks: Option<NetworksUsed>, planner: PlannerSettings, threads: usize) -> Self {
         let Build { commit, dirty } = build;
-        let (weights, libtorch, device) = match networks {
-            Some(used) => (Some(used.weights), Some(used.libtorch), Some(used.device)),
-            None => (None, None, None),
+        let (weights, modules, libtorch, device) = match networks {
+            Some(used) => {
+                let modules = Some(used.modules).filter(|modules| !modules.is_empty());
+                (Some(used.weights), modules, Some(used.libtorch), Some(used.device))
+            }
+            None => (None, None, None, None),
         };
         let version = crate::VERSION.to_owned();
         let decisive = serde_json::to_string(&(&version, METHOD, &weights, planner)).expect("plain data becomes JSON");
         let fingerprint = sha256(decisive.as_bytes())[..16].to_owned();
         let method = METHOD.to_owned();
-        Self { version, commit, dirty, method, weights, libtorch, device, threads, planner, fingerprint }
+        Self { version, commit, dirty, method, weights, modules, libtorch, device, threads, planner, fingerprint }
     }
 
     /// What keeps results from standing together with those made `before`: version, method, weights and settings that are
@@ -102,7 +108,8 @@ impl MadeBy {
 
     /// Whether everything but the number of threads and changes to the checkout is the same.
     pub fn is_same_maker(&self, other: &Self) -> bool {
-        let neutral = Self { threads: other.threads, dirty: other.dirty, ..self.clone() };
+        let (threads, dirty, modules) = (other.threads, other.dirty, other.modules.clone());
+        let neutral = Self { threads, dirty, modules, ..self.clone() };
         neutral == *other
     }
 
@@ -139,7 +146,12 @@ mod tests {
     fn networks(digit: &str) -> NetworksUsed {
         let weights =
             Weights { sigma_o: Some(digit.repeat(64)), sigma_m: Some("b".repeat(64)), change_temperature: Some(0.75) };
-        NetworksUsed { weights, libtorch: "2.13.0".to_owned(), device: "cpu".to_owned() }
+        NetworksUsed {
+            weights,
+            modules: ModuleFiles::default(),
+            libtorch: "2.13.0".to_owned(),
+            device: "cpu".to_owned(),
+        }
     }
 
     fn maker(digit: &str) -> MadeBy {

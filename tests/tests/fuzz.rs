@@ -16,6 +16,8 @@ mod engine;
 mod episodes;
 #[path = "fuzz/foreign.rs"]
 mod foreign;
+#[path = "fuzz/maps.rs"]
+mod maps;
 #[path = "fuzz/meshes.rs"]
 mod meshes;
 #[cfg(feature = "workbench")]

@@ -74,12 +74,17 @@ fn differences(now: Option<&MadeBy>, before: Option<&MadeBy>) -> Vec<String> {
 mod tests {
     use super::super::plan::tests::plan;
     use super::*;
-    use nudge_core::belief::{NetworksUsed, Weights};
+    use nudge_core::belief::{ModuleFiles, NetworksUsed, Weights};
     use nudge_core::made_by::Build;
 
     fn made(commit: &str, weights: &str, threads: usize) -> Plan {
         let weights = Weights { sigma_o: Some(weights.repeat(64)), ..Weights::default() };
-        let networks = NetworksUsed { weights, libtorch: "2.13.0".to_owned(), device: "cpu".to_owned() };
+        let networks = NetworksUsed {
+            weights,
+            modules: ModuleFiles::default(),
+            libtorch: "2.13.0".to_owned(),
+            device: "cpu".to_owned(),
+        };
         let build = Build { commit: commit.repeat(40), dirty: Some(threads == 1) };
         let plan = plan(None);
         Plan { made_by: Some(MadeBy::new(build, Some(networks), plan.planner, threads)), ..plan }

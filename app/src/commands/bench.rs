@@ -3,14 +3,15 @@
 use super::progress::{Progress, words};
 use super::{print, to_json, warn};
 use crate::bench::{
-    BenchDir, BrokenScene, EpisodeId, EpisodeResult, Event, Mixing, Plan, PolicyPlan, SummaryRow, Workers, load_sets,
-    merge, run as work, summarise,
+    BenchDir, BrokenScene, EpisodeId, EpisodeResult, Event, Mixing, Plan, PolicyPlan, SetPlan, SummaryRow, Workers,
+    load_sets, merge, run as work, summarise,
 };
 use crate::driver::belief_update;
 use crate::made_by;
 use nudge_core::Error;
-use nudge_core::belief::{CLASSICAL, CNABU};
+use nudge_core::belief::{BeliefUpdate, CLASSICAL, mixed_parts};
 use nudge_core::camera::NoiseModel;
+use nudge_core::grid::Grid;
 use nudge_core::made_by::MadeBy;
 use nudge_core::plan::PolicyKind;
 use nudge_core::scene::Catalog;
@@ -162,8 +163,9 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
         return Err(Error::Usage("--budget must be at least one action".to_owned()).into());
     }
     // What was not asked for is what serves the belief of a policy best, as in a run of the policy alone.
-    let belief = if policies.iter().any(|plan| plan.belief == CNABU) { CNABU } else { CLASSICAL };
-    let planner = args.planning.planner.settings(belief)?;
+    let belief = policies.iter().map(|plan| &plan.belief).find(|belief| *belief != CLASSICAL).cloned();
+    let belief = belief.unwrap_or_else(|| CLASSICAL.to_owned());
+    let planner = args.planning.planner.settings(&belief)?;
     for policy in &mut policies {
         let own = args.planning.planner.settings(&policy.belief)?;
         policy.planner = (own != planner).then_some(own);
@@ -174,7 +176,13 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     // All policies of a bench share the networks, if they run on any.
     let update = policies.iter().find(|plan| plan.belief == belief);
     let networks = match update {
-        Some(PolicyPlan { policy, belief, .. }) => belief_update(Some(belief), *policy)?.networks_used(),
+        Some(PolicyPlan { policy, belief, .. }) => {
+            let update = belief_update(Some(belief), *policy)?;
+            if mixed_parts(belief).is_some() {
+                check_on(&*update, &sets)?;
+            }
+            update.networks_used()
+        }
         None => None,
     };
     Ok(Plan {
@@ -194,6 +202,19 @@ fn plan(args: &RunArgs) -> anyhow::Result<Plan> {
     })
 }
 
+/// Refuses modules of the user's own that do not answer as they must, before the first episode and not at each.
+fn check_on(update: &dyn BeliefUpdate, sets: &[SetPlan]) -> nudge_core::Result<()> {
+    let mut grids: Vec<Grid> = Vec::new();
+    for scene in sets.iter().flat_map(|set| &set.scenes) {
+        let grid = scene.scene.grid();
+        if !grids.contains(&grid) {
+            update.check_grid(&grid)?;
+            grids.push(grid);
+        }
+    }
+    Ok(())
+}
+
 fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
     let mut kinds: Vec<PolicyKind> = Vec::new();
     for name in &args.policies {
@@ -205,7 +226,7 @@ fn policies(args: &RunArgs) -> anyhow::Result<Vec<PolicyPlan>> {
         }
     }
     let plan_of = |policy| {
-        let update = belief_update(args.planning.belief.as_deref(), policy)?;
+        let update = belief_update(args.planning.belief().as_deref(), policy)?;
         Ok(PolicyPlan { policy, belief: update.name().to_owned(), planner: None })
     };
     kinds.into_iter().map(plan_of).collect()

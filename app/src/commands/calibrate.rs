@@ -1,13 +1,16 @@
 //! `nudge calibrate`: how good and how well calibrated belief updates are on held-out scenes, against the number of views.
 
 use super::progress::Progress;
+use crate::driver::{belief_update, own};
 use crate::figure::{Calibrated, PIXELS_PER_UNIT, VIEWS, VIEWS_AFTER_PUSH, Views, calibration, escape};
+use crate::made_by;
 use crate::picture;
 use nudge_core::Error;
-use nudge_core::belief::{BeliefUpdate, CLASSICAL, CNABU, Classical};
+use nudge_core::belief::{BeliefUpdate, CLASSICAL, CNABU, Classical, NetworksUsed, mixed_parts};
 use nudge_core::cnabu::{self, Scored};
 use nudge_core::files::write_atomically;
 use nudge_core::learn::{Dataset, MapSample, PushSample, evaluate, evaluate_after_pushes, evaluate_pushes};
+use nudge_core::plan::PolicyKind;
 use nudge_core::score::{Scores, Tally};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,9 +30,11 @@ pub struct Args {
     /// Directory of the weights [default: where the shipped ones are]
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// Only these belief updates
+    /// Only these belief updates, beside the one with modules of your own, if there is one
     #[arg(long, value_delimiter = ',', default_value = "cnabu,classical")]
     beliefs: Vec<String>,
+    #[command(flatten)]
+    own: super::OwnArgs,
     /// Directory for the page and its figures
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -71,6 +76,7 @@ pub(super) fn table(name: &str, scores: &[Scored]) -> String {
 /// # Errors
 /// For data that is not there, weights that are missing or damaged, and what cannot be written.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    args.own.choose()?;
     let mut data = Dataset::<MapSample>::open(&args.data)?;
     data.skipped().iter().for_each(|skipped| super::warn(&format!("skipped: {skipped}")));
     data.truncate(args.scenes);
@@ -81,18 +87,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     let mut results: Vec<(String, Vec<Tally>)> = Vec::new();
     let mut pushed = Pushed::default();
-    for name in &args.beliefs {
-        let update: Arc<dyn BeliefUpdate> = match name.as_str() {
-            CLASSICAL => Arc::new(Classical),
-            CNABU => {
-                let directory = args.models.clone().or_else(cnabu::models_dir);
-                let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
-                cnabu::compute_beside_rayon();
-                let load = if pushes.is_some() { cnabu::load } else { cnabu::load_observation };
-                load(&directory.ok_or_else(missing)?)?
-            }
-            other => anyhow::bail!("unknown belief \"{other}\"; there are cnabu, classical"),
-        };
+    let mut networks: Vec<(String, NetworksUsed)> = Vec::new();
+    for name in args.beliefs.iter().cloned().chain(own::with_own(None)) {
+        let update = update_of(&name, args)?;
+        update.check_grid(&data.grid())?;
+        networks.extend(update.networks_used().map(|used| (name.clone(), used)));
         let progress = Progress::new(format!("{name} on views"), data.len());
         let tallies = evaluate(&data, &*update, &mut |done| progress.at(done))?;
         progress.finish();
@@ -108,6 +107,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             progress.finish();
             pushed.afterwards.push((name.clone(), tallies));
         }
+        update.fault().map_or(Ok(()), Err)?;
     }
     let of_pushes = args
         .pushes
@@ -115,7 +115,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         .zip(pushes.as_ref())
         .map(|(directory, pushes)| Source { directory, scenes: pushes.len() });
     let of_views = Source { directory: &args.data, scenes: data.len() };
-    let page = args.out.as_deref().map(|out| write_page(out, of_views, &results, of_pushes, &pushed)).transpose()?;
+    let page = args.out.as_deref();
+    let page = page.map(|out| write_page(out, of_views, &results, of_pushes, &pushed, &networks)).transpose()?;
     if args.json {
         let rows = |first: usize, of: &[(String, Vec<Tally>)]| -> Vec<serde_json::Value> {
             of.iter()
@@ -131,11 +132,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             "data": args.data,
             "scenes": data.len(),
             "results": rows(VIEWS.first, &results),
+            "networks": networks
+                .iter()
+                .map(|(name, used)| serde_json::json!({ "belief": name, "weights": used.weights, "modules": used.modules }))
+                .collect::<Vec<_>>(),
             "changed_cells": predictions,
             "after_pushes": rows(VIEWS_AFTER_PUSH.first, &pushed.afterwards),
         }))?);
     }
     super::print(&format!("{}: {} scenes\n", args.data.display(), data.len()))?;
+    for (name, used) in &networks {
+        super::print(&format!("{name}: {}\n", words(used)))?;
+    }
     for (name, tallies) in &results {
         super::print(&table(name, &scored(VIEWS.first, tallies)))?;
     }
@@ -152,6 +160,28 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         }
     }
     page.map_or(Ok(()), |page| super::print(&format!("{}\n", page.display())))
+}
+
+/// The belief update of a name.
+fn update_of(name: &str, args: &Args) -> anyhow::Result<Arc<dyn BeliefUpdate>> {
+    match name {
+        CLASSICAL => Ok(Arc::new(Classical)),
+        CNABU => {
+            let directory = args.models.clone().or_else(cnabu::models_dir);
+            let missing = || Error::Usage("no weights found; --models DIR names them".to_owned());
+            cnabu::compute_beside_rayon();
+            let load = if args.pushes.is_some() { cnabu::load } else { cnabu::load_observation };
+            Ok(load(&directory.ok_or_else(missing)?)?)
+        }
+        mixed if mixed_parts(mixed).is_some() => Ok(belief_update(Some(mixed), PolicyKind::Mem)?),
+        other => anyhow::bail!("unknown belief \"{other}\"; there are cnabu, classical"),
+    }
+}
+
+/// The networks of a belief update, and which of them are the user's own.
+fn words(used: &NetworksUsed) -> String {
+    let parts = made_by::networks(&used.weights, Some(&used.modules));
+    parts.map(|(name, value)| format!("{name} {value}")).join("; ")
 }
 
 /// Scores on held-out pushes.
@@ -177,6 +207,7 @@ fn write_page(
     results: &[(String, Vec<Tally>)],
     of_pushes: Option<Source<'_>>,
     pushed: &Pushed,
+    networks: &[(String, NetworksUsed)],
 ) -> Result<PathBuf, Error> {
     std::fs::create_dir_all(out).map_err(|error| Error::io(out, error))?;
     let title = format!("Belief updates on {} held-out scenes, random views", of_views.scenes);
@@ -199,6 +230,9 @@ fn write_page(
             html += &row(&escape(name), &[s.occupied_iou, s.semantic_miou, s.mece_occupancy]);
         }
         html += "</table>\n";
+    }
+    for (name, used) in networks {
+        html += &format!("<p>{}: {}</p>\n", escape(name), escape(&words(used)));
     }
     html += "</body></html>\n";
     let page = out.join("calibration.html");

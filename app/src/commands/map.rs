@@ -3,7 +3,7 @@
 mod table;
 
 use super::progress::Progress;
-use crate::driver::{Driver, belief_update};
+use crate::driver::{Driver, belief_update, own};
 use nudge_core::Error;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::environment::Recorded;
@@ -196,7 +196,7 @@ fn board(args: &Args, recording: &Recording) -> Result<(Board, String), Error> {
 }
 
 /// The recording's name as a scene's.
-fn name_of(recording: &Path) -> String {
+pub(super) fn name_of(recording: &Path) -> String {
     let whole = recording.canonicalize().unwrap_or_else(|_| recording.to_owned());
     let name = whole.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let name: String =
@@ -217,7 +217,7 @@ fn begin(args: &Args, scene: Scene, catalog: Arc<Catalog>, recorded: Recorded, o
     let is_classical = args.belief.as_deref() == Some("classical");
     let in_order = if is_classical { PolicyKind::Random } else { PolicyKind::RandomCnabu };
     let policy = args.policy.map_or(in_order, |policy| if policy == PolicyKind::Random { in_order } else { policy });
-    let update = belief_update(args.belief.as_deref(), policy)?;
+    let update = belief_update(own::with_own(args.belief.as_deref()).as_deref(), policy)?;
     let environment = Box::new(recorded);
     let frames = nudge_core::environment::Environment::views(&*environment).map_or(0, |views| views.views.len());
     let budget = args.budget.unwrap_or(frames);

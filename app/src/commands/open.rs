@@ -1,17 +1,23 @@
 //! `nudge` and `nudge open FILE`: the workbench.
 
+use super::convert::{Maps, import, is_map};
 use crate::planner_args::ChosenLastArgs;
 use crate::workbench::app::FormOptions;
 use crate::workbench::file_kind::FileKind;
 use anyhow::Context;
 use nudge_core::camera::{NoiseModel, ViewArray};
+use nudge_core::episode::{EpisodeDir, Overwrite};
+use nudge_core::foreign::CONVERTED;
 use nudge_core::plan::{PlannerSettings, PolicyKind};
-use std::path::PathBuf;
+use nudge_core::scene::Catalog;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What was typed.
 #[derive(clap::Args, Debug, Default)]
 pub struct Args {
-    /// A scene (.toml), an episode's directory, or a recording (.rrd)
+    /// A scene (.toml), an episode's directory, a recording (.rrd), or a map of another program (.bt, .ot, .ply, .npz, or a
+    /// folder of .npz), which becomes an episode in the folder that new ones go to (`nudge convert` takes a board and a scene)
     pub file: Option<PathBuf>,
     /// The rule that chooses actions (default: the one chosen last)
     #[arg(long)]
@@ -41,6 +47,8 @@ pub struct Args {
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "9876", value_parser = clap::value_parser!(u16).range(1..))]
     pub serve: Option<u16>,
     #[command(flatten)]
+    pub own: super::OwnArgs,
+    #[command(flatten)]
     pub planner: ChosenLastArgs,
 }
 
@@ -55,6 +63,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         // Nobody would see the message in the window.
         nudge_core::scene::Scene::load(file, &nudge_core::scene::Catalog::standard())?;
     }
+    args.own.choose()?;
     // Wrong choices are told here, where the command line is, and not in the window.
     args.views.as_deref().map_or(Ok(()), |views| ViewArray::named(views).map(|_| ()))?;
     let noise = args.noise.as_deref().map(NoiseModel::named).transpose()?;
@@ -63,8 +72,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         std::net::TcpListener::bind((crate::workbench::viewer::LOOPBACK, port))
             .with_context(|| format!("--serve {port}: the port cannot be opened"))?;
     }
+    let open = args.file.as_deref().map(|file| converted(file, &args.out)).transpose()?;
     let options = crate::workbench::app::Options {
-        open: args.file.clone(),
+        open,
         form: FormOptions {
             policy: args.policy,
             budget: args.budget,
@@ -81,4 +91,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         ..Default::default()
     };
     crate::workbench::run(options).map_err(|reason| anyhow::anyhow!("the window could not be opened: {reason}"))
+}
+
+/// What is to be opened: of a map of another program the episode that it becomes, in place of one that such a map became
+/// before.
+fn converted(file: &Path, out: &Path) -> anyhow::Result<PathBuf> {
+    if !is_map(file) {
+        return Ok(file.to_owned());
+    }
+    let (board, beliefs) = Maps::read(file)?.beliefs(None)?;
+    let to = out.join(format!("{}-converted", super::map::name_of(file)));
+    let is_older = || EpisodeDir::open(&to)?.record().map(|record| record.config.belief == CONVERTED);
+    let overwrite = if is_older().unwrap_or(false) { Overwrite::Replace } else { Overwrite::Refuse };
+    import(file, board, beliefs, None, Arc::new(Catalog::standard()), &to, overwrite)?;
+    Ok(to)
 }

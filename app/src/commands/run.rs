@@ -129,7 +129,7 @@ fn beside_of(out: &Path, policy: PolicyKind) -> PathBuf {
 /// Begins an episode, or goes on with the one that is there and is to be resumed.
 fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, out: &Path) -> anyhow::Result<Driver> {
     let scene = scene.with_hand_for(policy.picks());
-    let update = belief_update(args.planning.belief.as_deref(), policy)?;
+    let update = belief_update(args.planning.belief().as_deref(), policy)?;
     let outside = args.world.command.is_some();
     let config = EpisodeConfig {
         policy,

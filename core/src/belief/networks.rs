@@ -7,10 +7,31 @@ use serde::{Deserialize, Serialize};
 pub struct NetworksUsed {
     /// The weights.
     pub weights: Weights,
+    /// The files of what is the user's own.
+    pub modules: ModuleFiles,
     /// Version of libtorch that the program was built with; `unknown` if its folder did not tell.
     pub libtorch: String,
     /// `cpu` or `cuda`.
     pub device: String,
+}
+
+/// The names of the files, without folders, of modules of the user's own. What they hold is told by the hashes in
+/// [`Weights`]: a file may be renamed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ModuleFiles {
+    /// In place of sigma_o.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_o: Option<String>,
+    /// In place of sigma_m.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_m: Option<String>,
+}
+
+impl ModuleFiles {
+    /// Whether nothing is the user's own.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// The weights of the networks, each by the SHA-256 of its file in hexadecimal digits (what `sha256sum` prints).

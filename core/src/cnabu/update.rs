@@ -15,7 +15,7 @@ use super::push_net::PushNet;
 use super::weights::{Card, load_network};
 use super::{OBSERVE_WEIGHTS, PUSH_WEIGHTS};
 use crate::belief::{
-    Belief, BeliefUpdate, Classical, Intervention, NetworksUsed, Prediction, Weights, predict_held_apart,
+    Belief, BeliefUpdate, Classical, Intervention, ModuleFiles, NetworksUsed, Prediction, Weights, predict_held_apart,
 };
 use crate::camera::MapObservation;
 use crate::files::sha256_of_file;
@@ -205,6 +205,7 @@ impl BeliefUpdate for Cnabu {
         let device = if self.device().is_cuda() { "cuda" } else { "cpu" };
         Some(NetworksUsed {
             weights: self.weights.clone(),
+            modules: ModuleFiles::default(),
             libtorch: env!("NUDGE_LIBTORCH").to_owned(),
             device: device.to_owned(),
         })

@@ -31,6 +31,7 @@ pub fn infer(
     progress(0, logged.steps.len());
     for step in &logged.steps {
         move_on(&mut estimate, &*update, directory, &logged, step.index)?;
+        update.fault().map_or(Ok(()), Err)?;
         compare(&mut comparison, directory, &logged, step.index, &estimate)?;
         progress(step.index, logged.steps.len());
     }

@@ -16,7 +16,7 @@ use crate::scene::{Body, Catalog, ObjectId, Scene};
 use crate::skill::{ArmClearance, Manipulation};
 use crate::world::TruthMap;
 use crate::{Error, Result};
-use check::check;
+use check::{check, sound};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -190,11 +190,13 @@ impl Episode {
     ///
     /// # Errors
     /// [`Error::Usage`] past the budget, for a view that the array does not have, for a manipulation that is no finite motion
-    /// or that the arm cannot carry out, and for one after an object was dropped. The episode is then as it was.
+    /// or that the arm cannot carry out, and for one after an object was dropped: the episode is then as it was. What is
+    /// wrong with the belief update ([`BeliefUpdate::fault`]): the log is then as it was, and nothing is done any more.
     pub fn act(&mut self, mut decision: Decision) -> Result<StepOutcome> {
         if self.is_finished() {
             return Err(Error::Usage(format!("the budget of {} actions is used up", self.record.config.budget)));
         }
+        sound(&*self.update)?;
         decision.rule.get_or_insert(self.record.config.rule());
         let seconds = StepSeconds { decide: self.deciding.take(), ..StepSeconds::default() };
         let action = decision.action;
@@ -216,6 +218,7 @@ impl Episode {
 
         let started = Instant::now();
         self.estimate.look(&*self.update, &observation);
+        sound(&*self.update)?;
         self.told = Some(Told::Frame(sensed));
         let motion_s = motion.as_ref().map_or(0.0, Motion::duration_s);
         let happened = Happened { motion_s, ..Happened::default() };
@@ -259,6 +262,7 @@ impl Episode {
         let swept = manipulation.done(&outcome, &arm.arm, &self.grid());
         let is_predicted = self.record.config.is_predicted(decision.reason);
         let prediction = self.estimate.manipulate(&*self.update, &swept, is_predicted);
+        sound(&*self.update)?;
         self.told = Some(Told::Manipulation(swept.clone()));
         self.filed_truth = None;
         let happened = Happened {

@@ -150,16 +150,16 @@ fn opened<R: Read + Seek>(from: R, path: &Path) -> Result<ZipArchive<R>> {
 }
 
 /// An archive being written into memory.
-struct Archive {
+pub(crate) struct Archive {
     zip: ZipWriter<Cursor<Vec<u8>>>,
 }
 
 impl Archive {
-    fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self { zip: ZipWriter::new(Cursor::new(Vec::new())) }
     }
 
-    fn add<T: npyz::AutoSerialize + Copy>(&mut self, name: &str, shape: &[usize], values: &[T]) {
+    pub(crate) fn add<T: npyz::AutoSerialize + Copy>(&mut self, name: &str, shape: &[usize], values: &[T]) {
         let options = FileOptions::default()
             .compression_method(CompressionMethod::Deflated)
             .compression_level(Some(1))
@@ -179,19 +179,19 @@ impl Archive {
         self.zip.write_all(&npy).expect("an archive goes into memory");
     }
 
-    fn finish(mut self) -> Vec<u8> {
+    pub(crate) fn finish(mut self) -> Vec<u8> {
         self.zip.finish().expect("an archive goes into memory").into_inner()
     }
 }
 
 /// An archive being read.
-struct OpenArchive<'a> {
+pub(crate) struct OpenArchive<'a> {
     zip: ZipArchive<Cursor<&'a [u8]>>,
     path: &'a Path,
 }
 
 impl<'a> OpenArchive<'a> {
-    fn new(bytes: &'a [u8], path: &'a Path) -> Result<Self> {
+    pub(crate) fn new(bytes: &'a [u8], path: &'a Path) -> Result<Self> {
         Ok(Self { zip: opened(Cursor::new(bytes), path)?, path })
     }
 
@@ -230,9 +230,35 @@ impl<'a> OpenArchive<'a> {
         guarded(|| read(file).map_err(|error| error.to_string())).map_err(fail)
     }
 
-    fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         let file = npyz::npz::file_name_from_array_name(name);
         self.zip.file_names().any(|name| *name == file)
+    }
+
+    /// The shape of an array, of which no more than its header is unpacked.
+    pub(crate) fn shape(&mut self, name: &str) -> Result<Vec<usize>> {
+        let fail = |message: String| Error::input(self.path, format!("array {name}"), message);
+        let entry = self.zip.by_name(&npyz::npz::file_name_from_array_name(name));
+        let entry = entry.map_err(|error| fail(error.to_string()))?;
+        let mut head = Vec::new();
+        entry.take(MAX_NPY_HEADER).read_to_end(&mut head).map_err(|error| fail(error.to_string()))?;
+        let file = guarded(|| npyz::NpyFile::new(&head[..]).map_err(|error| error.to_string())).map_err(fail)?;
+        Ok(file.shape().iter().map(|n| *n as usize).collect())
+    }
+
+    /// The numbers of an array of float16, float32 or float64 as float32, of one number whatever its shape.
+    pub(crate) fn numbers(&mut self, name: &str, shape: Option<&[usize]>) -> Result<Vec<f32>> {
+        let shape = shape.map_or_else(|| self.shape(name), |shape| Ok(shape.to_vec()))?;
+        self.array(name, &shape, |file| {
+            let descr = file.dtype().descr();
+            Ok(if descr.contains("f2") {
+                file.into_vec::<f16>()?.to_f32_vec()
+            } else if descr.contains("f8") {
+                file.into_vec::<f64>()?.into_iter().map(|number| number as f32).collect()
+            } else {
+                file.into_vec::<f32>()?
+            })
+        })
     }
 
     fn words(&mut self, name: &str, shape: &[usize]) -> Result<Vec<u16>> {

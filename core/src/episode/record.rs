@@ -21,7 +21,8 @@ pub const FORMAT: u32 = 2;
 pub struct EpisodeConfig {
     /// The rule that chooses actions.
     pub policy: PolicyKind,
-    /// Name of the belief update: `classical` or `cnabu`.
+    /// Name of the belief update: `classical`, `cnabu`, or that of one with modules of the user's own
+    /// ([`mixed_name`](crate::belief::mixed_name)).
     pub belief: String,
     /// Seed of every random choice.
     pub seed: u64,

@@ -232,7 +232,7 @@ impl BeliefUpdate for Weighted {
 
     fn networks_used(&self) -> Option<NetworksUsed> {
         let weights = Weights { sigma_o: Some(self.0.repeat(64)), ..Weights::default() };
-        Some(NetworksUsed { weights, libtorch: "1".to_owned(), device: "cpu".to_owned() })
+        Some(NetworksUsed { weights, modules: Default::default(), libtorch: "1".to_owned(), device: "cpu".to_owned() })
     }
 
     fn observe(&self, belief: &Belief, observation: &MapObservation) -> Belief {

@@ -1,6 +1,6 @@
 //! Which voxels count as a gain: the choice, and what it makes of IGV and IGM, in words.
 
-use crate::belief::CNABU;
+use crate::belief::observes_with_networks;
 use crate::grid::VoxelSet;
 use crate::named;
 use serde::{Deserialize, Serialize};
@@ -26,7 +26,7 @@ impl Counted {
     /// The default for a belief update, by its name: the networks stay uncertain of edges however often they are looked
     /// at, so with them only unseen voxels count.
     pub fn of_belief(name: &str) -> Self {
-        if name == CNABU { Self::Unseen } else { Self::All }
+        if observes_with_networks(name) { Self::Unseen } else { Self::All }
     }
 
     /// The voxels that do not count, of those that looks have seen; `None` where all count.

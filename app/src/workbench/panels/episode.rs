@@ -1,7 +1,7 @@
 //! The episode at the left: its scene, how it is run, what can be done next, and the other open episodes.
 
 use super::tour;
-use crate::driver::{BELIEFS, belief_title, belief_update};
+use crate::driver::{BELIEFS, belief_title, belief_update, own_belief};
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session, SessionId};
@@ -16,7 +16,7 @@ use std::sync::LazyLock;
 /// Why belief updates are not there, by name; looked up once, since networks are read for it.
 static MISSING: LazyLock<BTreeMap<&str, String>> = LazyLock::new(|| {
     let reason = |name| belief_update(Some(name), PolicyKind::Mem).err().map(|error| error.to_string());
-    BELIEFS.into_iter().filter_map(|name| Some((name, reason(name)?))).collect()
+    BELIEFS.into_iter().chain(own_belief()).filter_map(|name| Some((name, reason(name)?))).collect()
 });
 
 /// What is done with an episode that was opened.
@@ -202,9 +202,9 @@ pub fn choices(ui: &mut egui::Ui, form: &mut StartForm) {
         egui::ComboBox::from_id_salt("belief")
             .selected_text(belief_title(&form.belief))
             .show_ui(ui, |ui| {
-                for belief in &BELIEFS {
+                for belief in BELIEFS.into_iter().chain(own_belief()) {
                     let missing = MISSING.get(belief);
-                    let choice = egui::Button::selectable(form.belief == *belief, belief_title(belief));
+                    let choice = egui::Button::selectable(form.belief == belief, belief_title(belief));
                     let choice = ui.add_enabled(missing.is_none(), choice);
                     if choice.on_disabled_hover_text(missing.map_or("", String::as_str)).clicked() {
                         *form = form.clone().with_belief(belief);

@@ -14,5 +14,11 @@ pub(super) fn check(scene: &Scene, config: &EpisodeConfig, update: &dyn BeliefUp
     if config.budget == 0 {
         return Err(Error::Usage("the budget must be at least one action".to_owned()));
     }
-    update.check_grid(&scene.grid())
+    update.check_grid(&scene.grid())?;
+    sound(update)
+}
+
+/// Whether nothing that the update answered was wrong.
+pub(super) fn sound(update: &dyn BeliefUpdate) -> Result<()> {
+    update.fault().map_or(Ok(()), Err)
 }

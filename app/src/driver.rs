@@ -25,8 +25,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
-/// File of the recording in an episode's directory.
-pub const RECORDING: &str = "episode.rrd";
+pub use crate::record::RECORDING;
 /// File of the summary figure in an episode's directory.
 pub const SUMMARY: &str = "summary.png";
 

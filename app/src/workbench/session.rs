@@ -1,6 +1,6 @@
 //! One open episode as the window sees it: every state it went through, and what is being done with it.
 
-use super::annotations::Annotations;
+use crate::annotations::Annotations;
 use super::half_belief::HalfBelief;
 use super::packed_frame::PackedFrame;
 use crate::driver::default_out;

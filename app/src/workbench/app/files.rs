@@ -1,7 +1,7 @@
 //! What is read and written: scenes, episodes and recordings that are opened, notes and scenes that are saved, exports.
 
 use super::{App, Chosen, ChosenFor, Opening};
-use crate::workbench::annotations;
+use crate::annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::Dialog;
 use crate::workbench::export;

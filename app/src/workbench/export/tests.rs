@@ -1,4 +1,4 @@
-use super::super::annotations::{Annotations, object_name};
+use crate::annotations::{Annotations, object_name};
 use super::super::fixture;
 use super::*;
 use crate::picture::RgbImage;

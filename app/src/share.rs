@@ -137,7 +137,11 @@ fn attach(episode: &mut Packed, letter: char, directory: &Path, room: usize) -> 
         }
     };
     let too_long = |length: usize| {
-        format!("The recording ({:.1} MB) is left out to keep the page below {} MB.", length as f64 / 1e6, LIMIT / 1_000_000)
+        format!(
+            "The recording ({:.1} MB) is left out to keep the page below {} MB.",
+            length as f64 / 1e6,
+            LIMIT / 1_000_000
+        )
     };
     // Base64 takes four letters for three bytes; recordings are compressed already.
     let text = (length <= room * 3 / 4).then(|| std::fs::read(&path)).transpose();

@@ -84,7 +84,13 @@ fn address(path: &Path) -> String {
 
 /// The worst and the best scenes of a set for the reference policy. `bench_from_page` leads from the page to the bench's
 /// directory.
-pub fn extremes(results: &Results, set: usize, catalog: &Catalog, bench_from_page: &Path, pages: Pages) -> Result<String> {
+pub fn extremes(
+    results: &Results,
+    set: usize,
+    catalog: &Catalog,
+    bench_from_page: &Path,
+    pages: Pages,
+) -> Result<String> {
     let at = reference(results);
     let Some(cell) = results.cell(set, at) else { return Ok(String::new()) };
     let policy = results.plan.policies[at].policy;

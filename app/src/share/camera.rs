@@ -89,7 +89,7 @@ fn frustum(frame: &Frame) -> Vec<[f32; 3]> {
     };
     let (right, bottom) = (camera.width as f32, camera.height as f32);
     let apex = place(camera.principal_px[0], camera.principal_px[1], 0.0);
-    let [a, b, c, d] = [[0.0, 0.0], [right, 0.0], [right, bottom], [0.0, bottom]]
-        .map(|[column, row]| place(column, row, FRUSTUM_M));
+    let [a, b, c, d] =
+        [[0.0, 0.0], [right, 0.0], [right, bottom], [0.0, bottom]].map(|[column, row]| place(column, row, FRUSTUM_M));
     vec![apex, a, b, apex, c, d, apex, d, a, b, c]
 }

@@ -247,7 +247,7 @@ class Page {
     const { step, colour, above } = this.state;
     document.getElementById("printed").textContent = `State: step ${step} of ${this.last}, voxels above ${above.toFixed(2)} coloured by ${colour}; #${this.address()}`;
     this.everything();
-    this.panes.forEach((pane) => pane.draw());
+    if (isPrinting) this.panes.forEach((pane) => pane.keepStill());
   }
 }
 

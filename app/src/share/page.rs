@@ -56,7 +56,8 @@ impl Common {
         let catalog = Catalog::standard();
         let stops = |map: Colormap| (0..64).map(|at| hex(map.rgb(at as f32 / 63.0))).collect();
         let classes = (0..CLASS_COUNT).map(|class| ClassId(class as u8)).map(|class| {
-            let title = if class == BACKGROUND { "background".to_owned() } else { colors::class_title(&catalog, class) };
+            let title =
+                if class == BACKGROUND { "background".to_owned() } else { colors::class_title(&catalog, class) };
             (title, hex(colors::of_class(&catalog, class)))
         });
         Self {
@@ -81,7 +82,9 @@ pub(super) fn differences(episodes: &[Packed]) -> Vec<String> {
     let (one, other) = (&a.record.scene, &b.record.scene);
     let mut found = Vec::new();
     if one != other {
-        let words = if one.name == other.name { "scenes of one name that are not the same".to_owned() } else {
+        let words = if one.name == other.name {
+            "scenes of one name that are not the same".to_owned()
+        } else {
             format!("two scenes, {} and {}", one.name, other.name)
         };
         found.push(format!("A and B map {words}: their scores do not compare."));

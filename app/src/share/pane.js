@@ -1,6 +1,7 @@
 // The belief of one episode in 3D, with what a hand can do to it; all panes share a camera.
 
 const LINE_COLOURS = { dark: { edge: [150, 150, 156], board: [104, 100, 92], truth: [255, 255, 255] }, light: { edge: [110, 110, 116], board: [188, 178, 162], truth: [40, 42, 48] } };
+const STILL = [1400, 760]; // pixels of a picture for paper
 const ACTED = [255, 112, 67];
 const STEPS_OF_ENTROPY = Float32Array.from({ length: 256 }, (_, byte) => {
   const p = Math.min(Math.max(byte / 255, 1e-6), 1 - 1e-6);
@@ -14,7 +15,8 @@ class Pane {
     this.canvas = make("canvas", { class: "space", tabindex: 0, role: "img", "aria-label": `${letter}the belief in three dimensions; drag to turn, wheel or pinch to zoom` });
     this.words = make("p", { class: "over weak" });
     const heading = letter ? make("h2", { class: "over" }, `${letter}${episode.story.title}`) : null;
-    this.root = make("div", { class: "pane" }, heading, this.canvas, this.words);
+    this.still = make("canvas", { class: "still", width: STILL[0], height: STILL[1] });
+    this.root = make("div", { class: "pane" }, heading, this.canvas, this.still, this.words);
     try {
       this.space = new Space(this.canvas);
       this.space.setShelf(episode.story);
@@ -131,6 +133,15 @@ class Pane {
   draw() {
     if (!this.space || !this.canvas.clientWidth) return;
     this.space.draw(this.page.state.camera, this.page.theme);
+  }
+
+  // A picture for paper: what WebGL draws is not always printed as it was drawn last.
+  keepStill() {
+    if (!this.space) return;
+    this.space.draw(this.page.state.camera, this.page.theme, STILL);
+    const pen = this.still.getContext("2d");
+    pen.clearRect(0, 0, ...STILL);
+    pen.drawImage(this.canvas, 0, 0);
   }
 
   // Mouse and touch: one finger turns, two zoom and move; the wheel zooms, the right button or shift moves.

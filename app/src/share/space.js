@@ -113,11 +113,20 @@ function program(gl, vertex, fragment) {
   return { made, at: new Proxy({}, { get: (_, name) => at(name) }) };
 }
 
+// Whether WebGL is drawn by the processor, where smooth edges cost as much as all the rest.
+function drawsInSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const told = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = told ? gl.getParameter(told.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 class Space {
   // Throws where there is no WebGL 2.
   constructor(canvas) {
     this.canvas = canvas;
-    const options = { alpha: true, antialias: true, preserveDrawingBuffer: true, powerPreference: "low-power" };
+    const options = { alpha: true, antialias: !drawsInSoftware(), preserveDrawingBuffer: true, powerPreference: "low-power" };
     this.gl = canvas.getContext("webgl2", options);
     if (!this.gl) throw new Error("no WebGL 2");
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
@@ -260,10 +269,11 @@ class Space {
     return product(lens, view);
   }
 
-  draw(camera, theme) {
+  // As large as it stands on the page, or of a given size in pixels.
+  draw(camera, theme, size = null) {
     const { gl, canvas } = this;
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((size) => Math.max(1, Math.round(size * ratio)));
+    const [width, height] = size ?? [canvas.clientWidth, canvas.clientHeight].map((length) => Math.max(1, Math.round(length * ratio)));
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     const aspect = width / height;
     const seen = this.eyeOf(camera, aspect);

@@ -1,7 +1,7 @@
 //! What was believed after the steps, and what was true, as bytes: of every kept step what changed since the one before.
 //!
 //! A state has four arrays, each as [`runs`](super::pack::runs) of what changed, the first since an array of zeros:
-//! * per voxel `[x][y][z]` the mean probability of being occupied, 255 for 1; 0 below [`LOWEST`];
+//! * per voxel `[x][y][z]` the mean probability of being occupied, 255 for 1, rounded down; 0 below [`LOWEST`];
 //! * per floor cell `[x][y]` the likeliest class and one, 0 where nothing is known;
 //! * per floor cell its probability, 255 for 1;
 //! * per floor cell the entropy of its column and class, 255 for the most that there can be.
@@ -30,7 +30,9 @@ fn byte(share: f32) -> u8 {
 fn arrays(belief: &Belief) -> [Vec<u8>; 4] {
     let cells = 0..belief.grid.cell_count();
     let [low, high] = entropy_range(&belief.grid);
-    let probability = |a: &[f32; 2]| Some(beta_mean(*a)).filter(|p| *p >= LOWEST).map_or(0, byte);
+    // Rounded down: a voxel of which nothing is known is not more probable than 0.5.
+    let below = |p: f32| (p.clamp(0.0, 1.0) * 255.0) as u8;
+    let probability = |a: &[f32; 2]| Some(beta_mean(*a)).filter(|p| *p >= LOWEST).map_or(0, below);
     [
         belief.occupancy.iter().map(probability).collect(),
         cells.clone().map(|cell| believed_class(belief, cell).map_or(0, |class| class.0 + 1)).collect(),
@@ -95,7 +97,7 @@ mod tests {
         belief.occupancy[4] = [1.0, 9.0];
         belief.semantics[1][4] = 16.0;
         let [occupancy, class, certainty, entropy] = arrays(&belief);
-        assert_eq!(occupancy[2..5], [128, 230, 0], "unknown, likely, unlikely");
+        assert_eq!(occupancy[2..5], [127, 229, 0], "unknown, likely, unlikely");
         assert_eq!(class, [0, 5, 0, 0]);
         assert_eq!(certainty[..2], [17, 136]);
         assert!(entropy[0] > entropy[1] && entropy[2] == 255, "{entropy:?}");

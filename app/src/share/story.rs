@@ -242,7 +242,7 @@ fn views(decision: &Decision) -> Vec<(usize, f32, &'static str)> {
 
 fn candidates(decision: &Decision) -> Vec<Candidate> {
     let row = |at: usize, candidate: &CandidateRecord| Candidate {
-        words: candidate.manipulation.describe().words,
+        words: format!("{} {}", candidate.manipulation.kind().name(), candidate.manipulation.describe().short),
         gain: candidate.gain,
         value: decision.value_of(candidate),
         mark: match at {

@@ -52,7 +52,8 @@ fn the_page_asks_for_nothing_and_names_no_place_to_ask() {
     assert!(!html.contains("http:") && !html.contains("https:") && html.contains("default-src 'none'"));
     assert_eq!(shared.bytes, html.len());
     assert!(shared.bytes < LIMIT, "{}", shared.bytes);
-    let frame: usize = html.len() - html.split("id=\"part-").skip(1).map(|part| part.find('<').unwrap_or(0)).sum::<usize>();
+    let frame: usize =
+        html.len() - html.split("id=\"part-").skip(1).map(|part| part.find('<').unwrap_or(0)).sum::<usize>();
     assert!(frame < FRAME, "{frame} bytes beside the parts");
 }
 
@@ -66,7 +67,11 @@ fn what_is_thinned_is_said_and_the_rest_fits() {
     let room = whole.bytes() * 3 / 4;
     let thin = read(&source, 'a', room, &go_on).expect("read");
     assert!(thin.story.kept.len() < 6 && thin.story.kept.contains(&0) && thin.story.kept.contains(&5));
-    assert!(thin.left_out[0].starts_with("Of 5 steps the page holds the beliefs and images of every "), "{:?}", thin.left_out);
+    assert!(
+        thin.left_out[0].starts_with("Of 5 steps the page holds the beliefs and images of every "),
+        "{:?}",
+        thin.left_out
+    );
     assert_eq!(thin.story.moments.len(), 6, "decisions and scores are all there");
 }
 
@@ -120,6 +125,7 @@ fn a_page_that_cannot_be_written_or_is_cancelled_leaves_nothing() {
     let out = folder.path().join("a.html");
     let error = write(&source(), &out, &|share| share < 0.3).expect_err("cancelled");
     assert!(error.to_string().contains("cancelled"), "{error}");
-    let names: Vec<_> = std::fs::read_dir(folder.path()).expect("listed").map(|e| e.expect("entry").file_name()).collect();
+    let names: Vec<_> =
+        std::fs::read_dir(folder.path()).expect("listed").map(|e| e.expect("entry").file_name()).collect();
     assert_eq!(names, ["a"]);
 }

@@ -13,8 +13,8 @@ use nudge_core::camera::hidden_objects;
 use nudge_core::cnabu;
 use nudge_core::environment::Environment;
 use nudge_core::episode::{
-    Episode, EpisodeConfig, EpisodeDir, EpisodeRecord, Frames, Observer, Overwrite, StepOutcome, resume,
-    resume_from_checkpoint, resume_within,
+    Episode, EpisodeDir, EpisodeRecord, Frames, Observer, Overwrite, StepOutcome, resume, resume_from_checkpoint,
+    resume_within,
 };
 use nudge_core::files::{remove_if_there, temporary_of};
 use nudge_core::plan::{Decision, PolicyKind};
@@ -98,42 +98,12 @@ impl Story {
 }
 
 impl Driver {
-    /// Starts an episode in the directory `out`, with or without what belief updates are told, and writes its prior.
+    /// Starts an episode that was just set up, in the directory `out`, with or without what belief updates are told, and writes
+    /// its prior.
     ///
     /// # Errors
-    /// What [`Episode::new`] and [`EpisodeDir::create`] refuse; nothing is written then.
-    pub fn start(
-        scene: Scene,
-        catalog: Arc<Catalog>,
-        config: EpisodeConfig,
-        update: Arc<dyn BeliefUpdate>,
-        out: &Path,
-        overwrite: Overwrite,
-        frames: Frames,
-    ) -> Result<Self> {
-        Self::of(Episode::new(scene, catalog, config, update)?, out, overwrite, frames)
-    }
-
-    /// Starts an episode in an environment of the caller's, as [`Driver::start`] does in a simulated one.
-    ///
-    /// # Errors
-    /// What [`Episode::within`] and [`EpisodeDir::create`] refuse; nothing is written then.
-    #[expect(clippy::too_many_arguments, reason = "what an episode is made of, and where it goes")]
-    pub fn start_within(
-        environment: Box<dyn Environment>,
-        scene: Scene,
-        catalog: Arc<Catalog>,
-        config: EpisodeConfig,
-        update: Arc<dyn BeliefUpdate>,
-        out: &Path,
-        overwrite: Overwrite,
-        frames: Frames,
-    ) -> Result<Self> {
-        Self::of(Episode::within(environment, scene, catalog, config, update)?, out, overwrite, frames)
-    }
-
-    /// Begins to write an episode that was just set up.
-    fn of(mut episode: Episode, out: &Path, overwrite: Overwrite, frames: Frames) -> Result<Self> {
+    /// What [`EpisodeDir::create`] refuses; nothing is written then.
+    pub fn start(mut episode: Episode, out: &Path, overwrite: Overwrite, frames: Frames) -> Result<Self> {
         episode.built_from(made_by::build());
         let mut directory = EpisodeDir::create(out, overwrite)?.with_frames(frames);
         let mut recorder = Recorder::create(&out.join(RECORDING), &episode)?;

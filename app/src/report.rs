@@ -9,6 +9,7 @@ mod markdown;
 mod page;
 mod palette;
 mod picks;
+mod promises;
 mod results;
 mod scenes;
 mod table;

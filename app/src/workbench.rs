@@ -9,6 +9,7 @@ pub mod app;
 pub mod author;
 pub mod browser;
 pub mod changes;
+pub mod columns;
 pub mod command;
 pub mod derive;
 pub mod dialog;

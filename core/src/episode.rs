@@ -8,6 +8,7 @@
 //! step; [`infer()`] has its beliefs again from its filed frames.
 
 mod checkpoint;
+mod delivered;
 mod directory;
 mod document;
 mod estimate;
@@ -24,6 +25,7 @@ mod stopwatch;
 mod synthetic;
 mod told_file;
 
+pub use delivered::{Acted, Delivered, Gained, LOWERED, MapState, delivered};
 pub use directory::{DirectoryState, EpisodeDir, Frames, Overwrite};
 pub use estimate::Told;
 pub use filed::{Observer, resume_within};

@@ -10,7 +10,11 @@
 //!
 //! The mean over the candidates stands for a push at random. Beside them stands how well the belief predicts each: the
 //! cross-entropy of what is occupied afterwards, by the prediction and by the belief as it is.
+//!
+//! Two other judges are asked the same first question, to tell what a poor choice is due to: the space that each candidate truly
+//! opens, and the mean over completions of the shelf ([`completion`]), which is the most that a belief can know.
 
+mod completion;
 mod predicted;
 mod summary;
 
@@ -70,6 +74,9 @@ pub struct ProbedPush {
     pub predicted_nats: f64,
     /// The same of the belief as it is, as if nothing changed.
     pub unchanged_nats: f64,
+    /// Mean over completions of the shelf of the objects that it wins minus those that it loses; `None` where none was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub completed: Option<f64>,
 }
 
 /// The pushes of one decision.
@@ -128,8 +135,8 @@ pub fn check_step(path: &Path, record: &EpisodeRecord, step: usize) -> Result<us
     }
 }
 
-/// Goes through the episode in a directory again and probes the decisions at some steps. `carried_out` is called after
-/// every push, from any thread; `each` is shown every step when it is done. Nothing is written. The second value is the
+/// Goes through the episode in a directory again and probes the decisions at some steps, with so many completions of the shelf each.
+/// `carried_out` is called after every push, in a completion or not, from any thread; `each` is shown every step when it is done. Nothing is written. The second value is the
 /// first place where repeating the episode did not lead where the log says: the candidates are those of the log even so.
 ///
 /// The result does not depend on the number of threads.
@@ -142,6 +149,7 @@ pub fn probe(
     catalog: Arc<Catalog>,
     update: Arc<dyn BeliefUpdate>,
     steps: &BTreeSet<usize>,
+    completions: usize,
     carried_out: &(dyn Fn() + Sync),
     each: &mut dyn FnMut(&StepProbe),
 ) -> Result<(Vec<StepProbe>, Option<Difference>)> {
@@ -163,7 +171,7 @@ pub fn probe(
         let done = episode.record().steps.len();
         if steps.contains(&(done + 1)) {
             stands_as_filed(directory, episode, done)?;
-            if let Some(probe) = probe_step(episode, &record.steps[done], carried_out) {
+            if let Some(probe) = probe_step(episode, &record.steps[done], completions, carried_out) {
                 each(&probe);
                 probes.push(probe);
             }
@@ -174,16 +182,25 @@ pub fn probe(
 }
 
 /// Probes the decision of a step of the log, of which `episode` has done all before; `None` where nothing is simulated.
-pub fn probe_step(episode: &Episode, logged: &StepRecord, carried_out: &(dyn Fn() + Sync)) -> Option<StepProbe> {
+pub fn probe_step(
+    episode: &Episode,
+    logged: &StepRecord,
+    completions: usize,
+    carried_out: &(dyn Fn() + Sync),
+) -> Option<StepProbe> {
     let decision = &logged.decision;
     let known = episode.counterfactual()?;
     let (at, motions): (Vec<usize>, Vec<PhasedMotion>) = motions(episode, logged).into_iter().unzip();
     let truths = known.of_each(&motions, carried_out);
     let chosen: Vec<Manipulation> = at.iter().map(|&at| decision.candidates[at].manipulation).collect();
     let nats = predicted::nats(episode, &chosen, &motions, &truths);
-    let pushes: Vec<ProbedPush> = (at.iter().zip(truths).zip(nats))
+    let mut pushes: Vec<ProbedPush> = (at.iter().zip(truths).zip(nats))
         .map(|((&at, truth), nats)| probed(episode, at, &decision.candidates[at], truth, nats))
         .collect();
+    if completions > 0 {
+        let worths = completion::worths(episode, known.hidden(), &motions, completions, carried_out);
+        pushes.iter_mut().zip(worths).for_each(|(push, worth)| push.completed = Some(worth));
+    }
     let position = |candidate: Option<usize>| pushes.iter().position(|push| Some(push.candidate) == candidate);
     let made = match logged.action {
         Action::Look { .. } => None,
@@ -255,6 +272,7 @@ fn probed(
         grip: truth.grip,
         predicted_nats,
         unchanged_nats,
+        completed: None,
     }
 }
 

@@ -27,6 +27,7 @@ pub use generate::{Family, GenerateConfig, generate};
 pub(crate) use mesh::read_mesh_points;
 pub use mesh::{MAX_PART_VERTICES, MAX_TRIANGLES, MeshReport, PartsFrom, Unit, load_mesh};
 pub use overlap::CONTACT_DEPTH_M;
+pub(crate) use overlap::PlacedBody;
 pub use rescale::{rescale, rescale_if_room};
 pub use robot::{RobotFile, RobotPlacement};
 pub use shape::Shape;

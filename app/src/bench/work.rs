@@ -187,7 +187,8 @@ pub fn run_episode(
         }
     };
     if let Some(path) = recording {
-        let mut driver = Driver::start(scene, catalog, config, update, path, Overwrite::Replace, Frames::Filed)?;
+        let mut driver =
+            Driver::start(Episode::new(scene, catalog, config, update)?, path, Overwrite::Replace, Frames::Filed)?;
         while !driver.episode().is_finished() {
             let decision = driver.decide();
             driver.act(decision)?;

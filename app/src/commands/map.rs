@@ -7,7 +7,7 @@ use crate::driver::{Driver, belief_update};
 use nudge_core::Error;
 use nudge_core::camera::{ViewArray, ViewId};
 use nudge_core::environment::Recorded;
-use nudge_core::episode::{EpisodeConfig, Frames, Overwrite, StepRecord};
+use nudge_core::episode::{Episode, EpisodeConfig, Frames, Overwrite, StepRecord};
 use nudge_core::files::write_atomically;
 use nudge_core::plan::{Action, Decision, PolicyKind, Reason};
 use nudge_core::recording::{Board, EDGE_DEG, LabelMap, Recording, Settings, Survey, find_board, inspect};
@@ -235,7 +235,7 @@ fn begin(args: &Args, scene: Scene, catalog: Arc<Catalog>, recorded: Recorded, o
     };
     let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
     let frames = if args.no_frames { Frames::Left } else { Frames::Filed };
-    Driver::start_within(environment, scene, catalog, config, update, out, overwrite, frames)
+    Driver::start(Episode::within(environment, scene, catalog, config, update)?, out, overwrite, frames)
 }
 
 /// Maps the next frame.

@@ -37,6 +37,10 @@ pub struct Args {
     /// Several steps: all that have push candidates, or a list
     #[arg(long, value_name = "all|A,B,...")]
     steps: Option<Steps>,
+    /// Judge the candidates too by the mean over N completions of the shelf: what no view shows is replaced by objects drawn at
+    /// random where no look has seen; the most that a belief can know, N times as slow
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u16).range(..=1024))]
+    completions: u16,
     #[command(flatten)]
     device: super::DeviceArgs,
     /// Write every push to a table, one a line
@@ -130,14 +134,14 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         tasks.push(task);
         pushes += count;
     }
-    let progress = Progress::new("probe", pushes);
+    let progress = Progress::new("probe", pushes * (1 + usize::from(args.completions)));
     let is_one = tasks.len() == 1 && tasks[0].steps.len() == 1;
     let mut probed = Vec::new();
     for task in &tasks {
         if !args.json && probed.is_empty() && !is_one {
             print(&table::headings())?;
         }
-        let found = carry_out(task, &progress, &mut |probe| {
+        let found = carry_out(task, usize::from(args.completions), &progress, &mut |probe| {
             if !args.json && !is_one {
                 progress.suspend(|| print(&table::step(&task.record, probe)))?;
             }
@@ -199,18 +203,26 @@ fn task(path: &Path, steps: &Steps) -> Result<(Task, usize), Error> {
 /// Probes an episode; `show` is given every step as it is done.
 fn carry_out(
     task: &Task,
+    completions: usize,
     progress: &Progress,
     show: &mut dyn FnMut(&StepProbe) -> anyhow::Result<()>,
 ) -> anyhow::Result<Probed> {
     let mut shown = Ok(());
     let name = &task.record.scene.name;
     let catalog = Arc::new(Catalog::standard());
-    let (probes, difference) =
-        probe(&task.directory, catalog, task.update.clone(), &task.steps, &|| progress.inc(), &mut |step| {
+    let (probes, difference) = probe(
+        &task.directory,
+        catalog,
+        task.update.clone(),
+        &task.steps,
+        completions,
+        &|| progress.inc(),
+        &mut |step| {
             if shown.is_ok() {
                 shown = show(step);
             }
-        })?;
+        },
+    )?;
     shown?;
     let config = &task.record.config;
     Ok(Probed {

@@ -143,10 +143,12 @@ fn begin(args: &Args, policy: PolicyKind, scene: Scene, catalog: Arc<Catalog>, o
     if !(args.resume && EpisodeDir::state(out)? == DirectoryState::Episode) {
         let overwrite = if args.force { Overwrite::Replace } else { Overwrite::Refuse };
         let frames = if args.no_frames && !args.frames { Frames::Left } else { Frames::Filed };
-        if outside {
-            return Ok(world::start(&args.world, scene, catalog, config, update, out, (overwrite, frames))?);
-        }
-        return Ok(Driver::start(scene, catalog, config, update, out, overwrite, frames)?);
+        let episode = if outside {
+            world::begin(&args.world, scene, catalog, config, update)?
+        } else {
+            Episode::new(scene, catalog, config, update)?
+        };
+        return Ok(Driver::start(episode, out, overwrite, frames)?);
     }
     let logged = EpisodeDir::open(out)?.record()?;
     let filed = if outside { world::unknown(&scene) } else { scene.clone() };

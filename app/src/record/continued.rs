@@ -46,7 +46,7 @@ mod tests {
     use super::*;
     use crate::driver::{Driver, RECORDING};
     use nudge_core::belief::Classical;
-    use nudge_core::episode::{EpisodeConfig, Frames, Overwrite};
+    use nudge_core::episode::{Episode, EpisodeConfig, Frames, Overwrite};
     use nudge_core::plan::{PlannerSettings, PolicyKind};
     use nudge_core::scene::{Catalog, GenerateConfig, Shelf, generate};
     use std::collections::{BTreeMap, BTreeSet};
@@ -88,8 +88,8 @@ mod tests {
         };
         let start = |out: &Path| {
             let (scene, config, update) = (scene.clone(), config.clone(), Arc::new(Classical));
-            Driver::start(scene, catalog.clone(), config, update, out, Overwrite::Refuse, Frames::Filed)
-                .expect("started")
+            let episode = Episode::new(scene, catalog.clone(), config, update).expect("an episode");
+            Driver::start(episode, out, Overwrite::Refuse, Frames::Filed).expect("started")
         };
         let go_on = |out: &Path| {
             let mut repeated = 0;

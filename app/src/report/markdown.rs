@@ -3,7 +3,7 @@
 use super::results::Results;
 use super::table::plain;
 use super::words::{self, Paragraph};
-use super::{picks, scenes, tables};
+use super::{picks, promises, scenes, tables};
 use nudge_core::Result;
 use nudge_core::scene::Catalog;
 
@@ -37,6 +37,7 @@ pub fn markdown(results: &Results) -> Result<String> {
             Some(tables::actions(results, set)),
             picks::ends(results, set),
             picks::counted_twice(results, set),
+            Some(promises::table(results, set)),
             Some(tables::verdicts(results, set)),
         ];
         text += &of_set.into_iter().flatten().map(|table| table.markdown()).collect::<String>();

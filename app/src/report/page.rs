@@ -4,7 +4,7 @@ use super::charts::{self, Figure, SIZE};
 use super::results::Results;
 use super::scenes::Pages;
 use super::words::{self, Paragraph, count};
-use super::{picks, scenes, tables};
+use super::{picks, promises, scenes, tables};
 use crate::bench::SetPlan;
 use crate::figure::{PIXELS_PER_UNIT, escape};
 use crate::picture;
@@ -60,6 +60,7 @@ impl Page {
             body += &tables::actions(results, set).html();
             body += &picks::ends(results, set).map_or(String::new(), |table| table.html());
             body += &picks::counted_twice(results, set).map_or(String::new(), |table| table.html());
+            body += &promises::table(results, set).html();
             body += &tables::verdicts(results, set).html();
             body += &scenes::extremes(results, set, &catalog, bench_from_page, pages)?;
         }

@@ -1,5 +1,6 @@
 //! The window: takes in what workers, jobs and the viewer tell, draws the panels, and carries out what they ask.
 
+mod around;
 mod carry_out;
 mod draw;
 mod files;
@@ -9,7 +10,7 @@ mod take_in;
 #[cfg(test)]
 mod tests;
 
-use super::browser::Browser;
+use super::browser::{Browser, Cache, Folders};
 use super::changes::{self, Largest};
 use super::command::{Command, Level, MenuCommand};
 use super::derive::Derived;
@@ -37,6 +38,8 @@ use std::sync::{Arc, Mutex};
 
 /// Where eframe keeps what outlasts the program.
 const STORAGE_KEY: &str = "nudge workbench";
+/// The scene that is chosen at the first start: what `make demo` maps.
+const DEMO: &str = "high/can-phalanx.toml";
 
 /// With what the window is opened.
 #[derive(Clone, Debug)]
@@ -250,6 +253,10 @@ pub struct App {
     wake: Wake,
     next_id: u32,
     dialog: Option<Dialog>,
+    /// The stop of the tour that is shown.
+    tour: Option<usize>,
+    /// Whether the tour is still to be shown.
+    is_new: bool,
     /// Whether a person has said that unsaved work may go.
     may_quit: bool,
     /// Milliseconds that the window's own part of the last frame took.
@@ -276,6 +283,11 @@ impl App {
             && let Some(kept) = cc.storage.and_then(|storage| eframe::get_value::<Remembered>(storage, STORAGE_KEY))
         {
             app.model.kept = kept;
+        }
+        app.is_new = app.options.remember && app.options.script.is_none() && !app.model.kept.toured;
+        if app.is_new && app.model.kept.form.scene.is_none() {
+            let demo = app.options.shipped_scenes.as_ref().map(|scenes| scenes.join(DEMO));
+            app.model.kept.form.scene = demo.filter(|demo| demo.is_file());
         }
         match Viewer::new(cc, app.options.serve) {
             Ok((viewer, stream)) => {
@@ -308,7 +320,12 @@ impl App {
         let wake: Wake = Arc::new(move || repaint.request_repaint());
         Self {
             model: Model {
-                browser: Browser::of(&options.scenes).and_shipped(options.shipped_scenes.clone()),
+                browser: Browser::of(Folders {
+                    scenes: options.scenes.clone(),
+                    shipped: options.shipped_scenes.clone(),
+                    episodes: Some(options.out.clone()),
+                })
+                .with_cache(if options.remember { Cache::of_user() } else { Cache::default() }),
                 ..Model::default()
             },
             panels: shown::Panels::default(),
@@ -337,6 +354,8 @@ impl App {
             wake,
             next_id: 0,
             dialog: None,
+            tour: None,
+            is_new: false,
             may_quit: false,
             frame_ms: None,
             viewer_ms: 0.0,

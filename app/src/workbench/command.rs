@@ -1,5 +1,6 @@
 //! Everything that a person can ask of the window, in one table: menus, shortcuts, buttons and tests use the same.
 
+use super::columns::Column;
 use super::model::{LayoutKind, Picked};
 use super::session::SessionId;
 pub use super::toasts::Level;
@@ -132,6 +133,8 @@ pub enum MenuCommand {
     EditScene,
     /// The layouts, in the order of their tabs.
     Layout(LayoutKind),
+    /// A panel that is shown or folded.
+    Panel(Column),
     /// Light or dark.
     ToggleTheme,
     /// Larger text.
@@ -140,6 +143,8 @@ pub enum MenuCommand {
     ZoomOut,
     /// The panels' sizes as at the first start.
     ResetLayout,
+    /// Five things to know of the window.
+    Tour,
     /// The table of shortcuts.
     Shortcuts,
     /// Versions and licences.

@@ -1,5 +1,6 @@
 //! The menus: text, tooltip and shortcut of every entry, in one table.
 
+use super::columns::Column;
 use super::command::MenuCommand as M;
 use super::model::{LayoutKind, Model};
 use super::session::{Activity, Session};
@@ -37,6 +38,11 @@ pub const MENUS: [(&str, &[Option<M>]); 5] = [
             Some(M::Layout(LayoutKind::Compare)),
             Some(M::Layout(LayoutKind::Author)),
             None,
+            Some(M::Panel(Column::Episode)),
+            Some(M::Panel(Column::Maps)),
+            Some(M::Panel(Column::Curves)),
+            Some(M::Panel(Column::Right)),
+            None,
             Some(M::ToggleTheme),
             Some(M::ZoomIn),
             Some(M::ZoomOut),
@@ -62,7 +68,7 @@ pub const MENUS: [(&str, &[Option<M>]); 5] = [
             Some(M::EditScene),
         ],
     ),
-    ("Help", &[Some(M::Shortcuts), Some(M::About)]),
+    ("Help", &[Some(M::Tour), Some(M::Shortcuts), Some(M::About)]),
 ];
 
 impl M {
@@ -102,10 +108,12 @@ impl M {
             M::Branch => "Branch from here",
             M::EditScene => "Edit a copy of the scene",
             M::Layout(layout) => layout.title(),
+            M::Panel(column) => column.title(),
             M::ToggleTheme => "Light or dark",
             M::ZoomIn => "Zoom in",
             M::ZoomOut => "Zoom out",
             M::ResetLayout => "Reset layout",
+            M::Tour => "Tour",
             M::Shortcuts => "Keyboard shortcuts",
             M::About => "About Nudge",
         }
@@ -142,10 +150,12 @@ impl M {
             M::Branch => "Start an episode that shares the actions up to the cursor; both stay open",
             M::EditScene => "Open a copy of this episode's scene in Author",
             M::Layout(layout) => layout.tooltip(),
+            M::Panel(column) => column.tooltip(),
             M::ToggleTheme => "Switch between the light and the dark theme",
             M::ZoomIn => "Larger text and controls",
             M::ZoomOut => "Smaller text and controls",
-            M::ResetLayout => "Panels as wide as at the first start",
+            M::ResetLayout => "Panels open and wide as at the first start",
+            M::Tour => "Five things to know of this window",
             M::Shortcuts => "Every command that has a key",
             M::About => "Versions and licences",
         }
@@ -191,7 +201,7 @@ impl M {
             M::ZoomOut => command(Key::Minus),
             M::Shortcuts => plain(Key::F1),
             M::EditScene => shifted(Key::D),
-            M::ResetLayout | M::About | M::Share => None,
+            M::Panel(_) | M::ResetLayout | M::Tour | M::About | M::Share => None,
         }
     }
 
@@ -215,7 +225,7 @@ impl M {
                 session.is_some() && model.runs_any(|session| session.activity == Activity::Running && !session.pausing)
             }
             M::Cancel => session.is_some() && model.runs_any(Session::can_be_cancelled),
-            M::Branch => session.is_some(),
+            M::Branch | M::Tour | M::Panel(_) => session.is_some(),
             M::EditScene => model.session().is_some(),
             _ => true,
         }

@@ -4,6 +4,7 @@
 use super::author::Author;
 use super::browser::Browser;
 use super::changes::{self, Largest};
+use super::columns::{Column, Columns};
 use super::derive::Derived;
 pub use super::layout_kind::LayoutKind;
 pub use super::picked::Picked;
@@ -219,6 +220,10 @@ pub struct Remembered {
     pub recent: Vec<PathBuf>,
     /// Light, where a person asked for it.
     pub light: bool,
+    /// Which panels are open.
+    pub columns: Columns,
+    /// Whether the tour was shown to its end, or skipped.
+    pub toured: bool,
 }
 
 /// Everything that the window shows.
@@ -266,6 +271,8 @@ pub struct Model {
     pub browser: Browser,
     /// Messages that fade.
     pub toasts: Toasts,
+    /// Size of the window, points.
+    pub window: [f32; 2],
     /// How far the arm is moved along its motion.
     pub scrubbed: Scrubbed,
 }
@@ -347,6 +354,11 @@ impl Model {
     pub fn shows_episode(&self) -> bool {
         let hidden = self.browsing || self.recording.is_some() || self.kept.layout == LayoutKind::Author;
         self.session().is_some() && !hidden
+    }
+
+    /// Whether a panel is open.
+    pub fn shows(&self, column: Column) -> bool {
+        self.kept.columns.is_open(column, self.window)
     }
 
     /// The state at the cursor.

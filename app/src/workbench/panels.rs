@@ -16,8 +16,10 @@ pub mod maps;
 pub mod notes;
 #[cfg(test)]
 mod photo;
+pub mod promises;
 pub mod push;
 pub mod scenes;
+pub mod tour;
 pub mod why;
 pub mod windows;
 

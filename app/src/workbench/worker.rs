@@ -11,7 +11,7 @@ use super::session::{Activity, Moment, SessionId};
 use super::threads::Threads;
 use crate::driver::Driver;
 use nudge_core::Result;
-use nudge_core::episode::{EpisodeConfig, EpisodeRecord, Frames, Overwrite, StepRecord};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, Frames, Overwrite, StepRecord};
 use nudge_core::plan::Decision;
 use nudge_core::scene::{Catalog, Scene};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -234,7 +234,8 @@ fn begin_anew(
     brake: &Brake,
 ) -> Result<(Track, Arc<Moment>)> {
     let update = crate::driver::belief_update(Some(&config.belief), config.policy)?;
-    let mut driver = Driver::start(scene, catalog, config, update.clone(), out, Overwrite::Refuse, Frames::Filed)?;
+    let mut driver =
+        Driver::start(Episode::new(scene, catalog, config, update.clone())?, out, Overwrite::Refuse, Frames::Filed)?;
     let mut moments = vec![Arc::new(moment(driver.episode(), None, None))];
     let shared = steps.len();
     for (done, step) in steps.into_iter().enumerate() {

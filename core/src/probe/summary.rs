@@ -51,6 +51,11 @@ pub struct StepSummary {
     pub objects: MeasureSummary,
     /// By volume, litres.
     pub volume: MeasureSummary,
+    /// By objects, where the push that truly opens most space is chosen.
+    pub objects_by_space: MeasureSummary,
+    /// By objects, where the push is chosen that wins most in the mean over completions of the shelf; without a choice where there
+    /// are none.
+    pub objects_by_completions: MeasureSummary,
     /// Share of pushes that jammed.
     pub jammed_share: f64,
     /// Share of pushes that dropped an object.
@@ -79,6 +84,8 @@ impl StepProbe {
             winning_share: share(|push| !push.won.is_empty()),
             objects: self.by(Measure::Objects),
             volume: self.by(Measure::Volume),
+            objects_by_space: self.judged(Measure::Objects, |push| Some(push.opened_l)),
+            objects_by_completions: self.judged(Measure::Objects, |push| push.completed),
             jammed_share: share(|push| push.jammed),
             dropped_share: share(|push| !push.dropped.is_empty()),
             toppled_share: share(|push| !push.toppled.is_empty()),
@@ -89,12 +96,31 @@ impl StepProbe {
     }
 
     fn by(&self, measure: Measure) -> MeasureSummary {
+        self.chosen_by(measure, self.chosen, |push| push.promised_gain.map(f64::from))
+    }
+
+    /// Where another judge chooses, the first of equals.
+    fn judged(&self, measure: Measure, judge: fn(&ProbedPush) -> Option<f64>) -> MeasureSummary {
+        let better = |best: Option<(usize, f64)>, (at, judged): (usize, Option<f64>)| match (best, judged) {
+            (Some((_, most)), Some(judged)) if judged <= most => best,
+            (_, Some(judged)) => Some((at, judged)),
+            (_, None) => best,
+        };
+        let chosen = self.pushes.iter().map(judge).enumerate().fold(None, better);
+        self.chosen_by(measure, chosen.map(|(at, _)| at), judge)
+    }
+
+    fn chosen_by(
+        &self,
+        measure: Measure,
+        chosen: Option<usize>,
+        judge: fn(&ProbedPush) -> Option<f64>,
+    ) -> MeasureSummary {
         let worths: Vec<f64> = self.pushes.iter().map(|push| measure.of(push)).collect();
-        let (promises, promised): (Vec<f64>, Vec<f64>) = (self.pushes.iter().zip(&worths))
-            .filter_map(|(push, worth)| Some((f64::from(push.promised_gain?), *worth)))
-            .unzip();
+        let (promises, promised): (Vec<f64>, Vec<f64>) =
+            self.pushes.iter().zip(&worths).filter_map(|(push, worth)| Some((judge(push)?, *worth))).unzip();
         let best = worths.iter().copied().reduce(f64::max).unwrap_or(0.0);
-        let chosen = self.chosen.map(|at| worths[at]);
+        let chosen = chosen.map(|at| worths[at]);
         MeasureSummary {
             rank_correlation: rank_correlation(&promises, &promised),
             chosen,
@@ -115,6 +141,8 @@ impl StepSummary {
             winning_share: over(|s| s.winning_share),
             objects: MeasureSummary::mean_of(summaries.iter().map(|s| s.objects)),
             volume: MeasureSummary::mean_of(summaries.iter().map(|s| s.volume)),
+            objects_by_space: MeasureSummary::mean_of(summaries.iter().map(|s| s.objects_by_space)),
+            objects_by_completions: MeasureSummary::mean_of(summaries.iter().map(|s| s.objects_by_completions)),
             jammed_share: over(|s| s.jammed_share),
             dropped_share: over(|s| s.dropped_share),
             toppled_share: over(|s| s.toppled_share),

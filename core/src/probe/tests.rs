@@ -55,7 +55,7 @@ fn catalog() -> Arc<Catalog> {
 
 fn probed(path: &Path, steps: &[usize]) -> Result<(Vec<StepProbe>, Option<Difference>)> {
     let steps = steps.iter().copied().collect();
-    probe(&EpisodeDir::open(path)?, catalog(), Arc::new(Classical), &steps, &|| (), &mut |_| ())
+    probe(&EpisodeDir::open(path)?, catalog(), Arc::new(Classical), &steps, 0, &|| (), &mut |_| ())
 }
 
 /// Every file below a directory with its bytes and when it was written.
@@ -213,6 +213,7 @@ fn made_up(rows: &[(Option<f32>, usize, usize, f64)], chosen: Option<usize>) -> 
         grip: None,
         predicted_nats: 0.0,
         unchanged_nats: 0.0,
+        completed: None,
     };
     StepProbe {
         step: 7,
@@ -252,4 +253,35 @@ fn correlation_and_regret_of_made_up_pushes() {
     let same = made_up(&[(Some(1.0), 0, 0, 0.0), (Some(2.0), 0, 0, 0.0)], Some(1)).summary();
     assert_eq!((same.objects.rank_correlation, same.objects.regret), (None, Some(0.0)));
     assert_eq!(StepSummary::mean_of(&[]), StepSummary::default());
+}
+
+#[test]
+fn completions_judge_pushes_without_knowing_what_is_hidden() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let path = dir.path().join("e");
+    let record = run(&path, PolicyKind::Mem, 5).record().clone();
+    let step = probable_steps(&record)[0].0;
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let (directory, steps) = (EpisodeDir::open(&path).expect("opens"), BTreeSet::from([step]));
+        let probe = || probe(&directory, catalog(), Arc::new(Classical), &steps, 4, &|| (), &mut |_| ());
+        pool.install(probe).expect("probed").0.remove(0)
+    };
+    let probe = on(2);
+    assert_eq!(probe, on(1));
+    let worths: Vec<f64> = probe.pushes.iter().filter_map(|push| push.completed).collect();
+    assert_eq!(worths.len(), probe.pushes.len());
+    assert!(worths.iter().all(|worth| (worth * 4.0).fract() == 0.0), "means of four whole numbers: {worths:?}");
+    assert!(worths.iter().any(|worth| *worth != 0.0), "what is put behind the boxes comes into sight: {worths:?}");
+    let summary = probe.summary();
+    assert!(summary.objects_by_completions.chosen.is_some() && summary.objects_by_space.chosen.is_some());
+
+    // Another judge, other choices: by space the last push, by completions the second.
+    let mut made_up = made_up(&[(Some(9.0), 2, 0, 1.0), (Some(2.0), 1, 0, 2.0), (Some(3.0), 0, 1, 3.0)], Some(0));
+    let worths = [0.25, 0.5, 0.5];
+    made_up.pushes.iter_mut().zip(worths).for_each(|(push, worth)| push.completed = Some(worth));
+    let summary = made_up.summary();
+    assert_eq!(summary.objects.chosen, Some(2.0));
+    assert_eq!(summary.objects_by_space.chosen, Some(-1.0));
+    assert_eq!(summary.objects_by_completions.chosen, Some(1.0), "the first of equals");
 }

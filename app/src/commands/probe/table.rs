@@ -43,7 +43,13 @@ pub(super) fn pushes(probed: &Probed, step: &ProbedStep) -> String {
     if probe.made.is_some() {
         text += "; ! the one that was made";
     }
-    let _ = write!(text, "\n\n{}{}{}", headings(), line(&format!("step {}", probe.step), summary), predicted(summary));
+    let _ = write!(
+        text,
+        "\n\n{}{}{}",
+        headings(),
+        line(&format!("step {}", probe.step), summary),
+        judges(summary) + &predicted(summary)
+    );
     text
 }
 
@@ -113,7 +119,20 @@ pub(super) fn step(record: &EpisodeRecord, probe: &StepProbe) -> String {
 
 /// The last line: means over decisions.
 pub(super) fn mean(mean: &StepSummary, decisions: usize) -> String {
-    line(&format!("mean of {decisions} decisions"), mean) + &predicted(mean)
+    line(&format!("mean of {decisions} decisions"), mean) + &judges(mean) + &predicted(mean)
+}
+
+/// What other judges would have chosen, by objects.
+fn judges(summary: &StepSummary) -> String {
+    let told = |by: &str, judged: &MeasureSummary| {
+        judged.chosen.map_or(String::new(), |chosen| {
+            let rank = judged.rank_correlation.map_or("-".to_owned(), |rank| format!("{rank:.2}"));
+            format!("objects won - lost, chosen {by}: {chosen:.2} (rank {rank})\n")
+        })
+    };
+    let by_space = told("by the space that each truly opens", &summary.objects_by_space);
+    let by_completions = told("by completions of the shelf", &summary.objects_by_completions);
+    format!("\n{by_space}{by_completions}")
 }
 
 /// How well the belief predicts what is occupied afterwards.
@@ -144,7 +163,7 @@ fn line(name: &str, summary: &StepSummary) -> String {
 }
 
 /// The columns of the CSV, units in their names.
-const COLUMNS: [&str; 29] = [
+const COLUMNS: [&str; 30] = [
     "episode",
     "scene",
     "policy",
@@ -174,6 +193,7 @@ const COLUMNS: [&str; 29] = [
     "grip",
     "predicted_nats",
     "unchanged_nats",
+    "completed",
 ];
 
 /// Every push as CSV (RFC 4180), one a line, of each decision the planner's best first; of objects the names, with spaces between them.
@@ -226,6 +246,7 @@ fn fields(probed: &Probed, probe: &StepProbe, at: usize, push: &ProbedPush) -> [
         push.grip.map_or(String::new(), |grip| grip.to_string()),
         push.predicted_nats.to_string(),
         push.unchanged_nats.to_string(),
+        push.completed.map_or(String::new(), |worth| worth.to_string()),
     ]
 }
 

@@ -3,7 +3,7 @@
 use crate::driver::Driver;
 use nudge_core::belief::BeliefUpdate;
 use nudge_core::environment::{External, WorldSettings};
-use nudge_core::episode::{EpisodeConfig, EpisodeRecord, Frames, Observer, Overwrite};
+use nudge_core::episode::{Episode, EpisodeConfig, EpisodeRecord, Observer};
 use nudge_core::scene::{Catalog, Scene};
 use nudge_core::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -43,18 +43,16 @@ fn settings(args: &Args, seed: u64) -> Result<WorldSettings> {
     Ok(WorldSettings { command, timeout_s: args.timeout_s, folder, seed })
 }
 
-/// Begins an episode in the world.
-pub(super) fn start(
+/// An episode in the world, before its first action.
+pub(super) fn begin(
     args: &Args,
     scene: Scene,
     catalog: Arc<Catalog>,
     config: EpisodeConfig,
     update: Arc<dyn BeliefUpdate>,
-    out: &Path,
-    (overwrite, frames): (Overwrite, Frames),
-) -> Result<Driver> {
+) -> Result<Episode> {
     let world = Box::new(External::start(&settings(args, config.seed)?, &scene, &[])?);
-    Driver::start_within(world, unknown(&scene), catalog, config, update, out, overwrite, frames)
+    Episode::within(world, unknown(&scene), catalog, config, update)
 }
 
 /// Goes on with an episode, now that the world is back.

@@ -1,6 +1,7 @@
 //! What is done with the commands that panels, menus and shortcuts give.
 
 use super::{App, ChosenFor, Kept, Opening, Pair};
+use crate::workbench::columns::Columns;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::{Dialog, Reply};
 use crate::workbench::model::LayoutKind;
@@ -153,7 +154,15 @@ impl App {
             MenuCommand::ToggleTheme => self.model.kept.light = !self.model.kept.light,
             MenuCommand::ZoomIn => self.zoom_asked = Some(1.1),
             MenuCommand::ZoomOut => self.zoom_asked = Some(1.0 / 1.1),
-            MenuCommand::ResetLayout => self.reset_asked = true,
+            MenuCommand::ResetLayout => {
+                self.model.kept.columns = Columns::default();
+                self.reset_asked = true;
+            }
+            MenuCommand::Panel(column) => self.model.kept.columns.toggle(column, self.model.window),
+            MenuCommand::Tour => {
+                self.lay_out(LayoutKind::Episode);
+                self.tour = Some(0);
+            }
             MenuCommand::Shortcuts => self.dialog = Some(Dialog::Shortcuts),
             MenuCommand::About => self.dialog = Some(Dialog::About),
         }

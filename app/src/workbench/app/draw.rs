@@ -5,7 +5,8 @@ use super::App;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::menu::MENUS;
 use crate::workbench::model::LayoutKind;
-use crate::workbench::panels::{self, Panel};
+use crate::workbench::panels;
+use crate::workbench::panels::tour::{self, Move, Spot};
 use crate::workbench::part::Part;
 use re_viewer::external::re_ui::RecordingCommandKind;
 use re_viewer::external::{eframe, egui};
@@ -17,9 +18,11 @@ impl App {
         let started = Instant::now();
         let ctx = ui.ctx().clone();
         self.before(&ctx);
+        self.model.window = ctx.content_rect().size().into();
         let mut ask = Vec::new();
         egui::Panel::top("menus").show(ui, |ui| self.menus(ui, &mut ask));
-        egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
+        let clock = egui::Panel::bottom("clock").show(ui, |ui| panels::clock::show(ui, &mut self.model, &mut ask));
+        tour::mark(&ctx, Spot::Clock, clock.response.rect);
         let openings: Vec<_> =
             self.openings.iter().map(|(id, opening)| (*id, opening.title.clone(), opening.activity)).collect();
         self.parts.clear();
@@ -37,12 +40,7 @@ impl App {
                 panels::scenes::show(ui, &mut self.model, &mut ask);
             });
         } else {
-            egui::Panel::left("episode").default_size(236.0).size_range(200.0..=380.0).show(ui, |ui| {
-                scrolled(ui, "episode", |ui| {
-                    panels::episode::openings(ui, &openings, &mut ask);
-                    panels::episode::show(ui, &mut self.model, &mut ask);
-                });
-            });
+            self.episode(ui, &openings, &mut ask);
             self.layout(ui, frame, &mut ask);
         }
         if let Some(ray) = self.ray.take() {
@@ -117,6 +115,7 @@ impl App {
                         ask.push(Command::Layout(layout));
                     }
                 }
+                tour::mark(ui.ctx(), Spot::Layouts, ui.min_rect());
                 if let Some(port) = self.model.serving {
                     ui.separator();
                     ui.label(format!("● serving 127.0.0.1:{port}")).on_hover_text(format!(
@@ -128,7 +127,8 @@ impl App {
     }
 
     fn entry(&self, ui: &mut egui::Ui, entry: MenuCommand) -> egui::Response {
-        let mut button = egui::Button::new(entry.title());
+        let is_open = matches!(entry, MenuCommand::Panel(column) if self.model.shows(column));
+        let mut button = egui::Button::new(entry.title()).selected(is_open);
         if let Some(keys) = entry.shortcut() {
             button = button.shortcut_text(ui.ctx().format_shortcut(&keys));
         }
@@ -151,57 +151,11 @@ impl App {
         });
     }
 
-    fn layout(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>, ask: &mut Vec<Command>) {
-        let layout = self.model.kept.layout;
-        let right = egui::Panel::right(egui::Id::new(("right", layout)))
-            .default_size(layout.right_width())
-            .size_range(240.0..=700.0)
-            .show(ui, |ui| {
-                ui.add_space(4.0);
-                match layout {
-                    LayoutKind::Why => self.panels.why.show(ui, &mut self.model, ask),
-                    LayoutKind::Gains => self.panels.gains.show(ui, &mut self.model, ask),
-                    LayoutKind::Push => self.panels.push.show(ui, &mut self.model, ask),
-                    LayoutKind::Compare => self.panels.compare.show(ui, &mut self.model, ask),
-                    LayoutKind::Episode | LayoutKind::Author => scrolled(ui, "right", |ui| {
-                        self.panels.decision.show(ui, &mut self.model, ask);
-                        ui.add_space(8.0);
-                        ui.separator();
-                        panels::notes::show(ui, &mut self.model, ask);
-                    }),
-                }
-            });
-        self.parts.push((Part::Right, right.response.rect));
-        if matches!(layout, LayoutKind::Episode | LayoutKind::Compare) {
-            let curves = egui::Panel::bottom("curves")
-                .resizable(true)
-                .default_size(190.0)
-                .size_range(130.0..=420.0)
-                .show(ui, |ui| {
-                    panels::curves::show(ui, &mut self.model, ask);
-                });
-            self.parts.push((Part::Curves, curves.response.rect));
-        }
-        if matches!(layout, LayoutKind::Episode | LayoutKind::Why) {
-            let maps = egui::Panel::right("maps").default_size(340.0).size_range(220.0..=800.0).show(ui, |ui| {
-                scrolled(ui, "maps", |ui| {
-                    self.panels.maps.show(ui, &mut self.model, ask);
-                    ui.add_space(6.0);
-                    self.panels.camera.show(ui, &mut self.model, ask);
-                });
-            });
-            self.parts.push((Part::Maps, maps.response.rect));
-        }
-        egui::Panel::bottom("display").show(ui, |ui| {
-            panels::display::show(ui, &mut self.model, self.drawn.count(crate::workbench::space::at::BELIEF), ask);
-        });
-        self.space_view(ui, frame);
-    }
-
     /// The three-dimensional views, or why there are none.
-    fn space_view(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
+    pub(super) fn space_view(&mut self, ui: &mut egui::Ui, frame: Option<&mut eframe::Frame>) {
         let started = Instant::now();
         self.parts.push((Part::Space, ui.available_rect_before_wrap()));
+        tour::mark(ui.ctx(), Spot::Space, ui.available_rect_before_wrap());
         match (&mut self.viewer, frame) {
             (Some(viewer), Some(frame)) => {
                 let (ctx, space) = (ui.ctx().clone(), ui.available_rect_before_wrap());
@@ -240,8 +194,25 @@ impl App {
         {
             self.reply(reply);
         }
+        self.lead(ctx);
         panels::windows::tasks(ctx, self.tasks.under_way(), ask);
         panels::windows::toasts(ctx, &mut self.model.toasts, ask);
+    }
+
+    /// The tour: shown to whoever is new as soon as an episode has something to show.
+    fn lead(&mut self, ctx: &egui::Context) {
+        let is_ready =
+            self.dialog.is_none() && self.model.shows_episode() && self.model.kept.layout == LayoutKind::Episode;
+        let has_steps = self.model.session().is_some_and(|session| session.steps() > 0);
+        if self.is_new && is_ready && has_steps {
+            (self.is_new, self.tour) = (false, Some(0));
+        }
+        let Some(at) = self.tour.filter(|_| is_ready) else { return };
+        match panels::tour::show(ctx, at, |spot| tour::marked(ctx, spot)) {
+            Some(Move::To(stop)) => self.tour = Some(stop),
+            Some(Move::End) => (self.tour, self.model.kept.toured) = (None, true),
+            None => (),
+        }
     }
 
     /// The recording that is looked at, and its clock.
@@ -288,13 +259,4 @@ fn tooltip(ctx: &egui::Context, entry: MenuCommand) -> String {
         Some(keys) => format!("{} ({})", entry.tooltip(), ctx.format_shortcut(&keys)),
         None => entry.tooltip().to_owned(),
     }
-}
-
-fn scrolled(ui: &mut egui::Ui, id: &str, content: impl FnOnce(&mut egui::Ui)) {
-    egui::ScrollArea::vertical().id_salt(id).auto_shrink(false).show(ui, |ui| {
-        // Room for the bar, which floats over what is at the edge.
-        ui.set_max_width(ui.available_width() - 4.0);
-        ui.add_space(4.0);
-        content(ui);
-    });
 }

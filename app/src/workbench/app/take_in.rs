@@ -257,7 +257,7 @@ impl App {
             // Undo and the keys without a modifier belong to whatever is typed in, and the editor has its own.
             let edits =
                 matches!(entry, MenuCommand::Undo | MenuCommand::Redo | MenuCommand::Duplicate | MenuCommand::Delete);
-            if self.dialog.is_some() && entry != MenuCommand::Quit {
+            if (self.dialog.is_some() || self.tour.is_some()) && entry != MenuCommand::Quit {
                 continue;
             }
             if (plain && (typing || menu)) || (edits && (typing || authoring)) {
@@ -282,7 +282,8 @@ impl App {
         for (key, entry) in
             [(egui::Key::ArrowLeft, MenuCommand::StepBack), (egui::Key::ArrowRight, MenuCommand::StepForward)]
         {
-            let free = !typing && !focused && !menu && self.dialog.is_none() && self.model.shows_episode();
+            let asked = self.dialog.is_some() || self.tour.is_some();
+            let free = !typing && !focused && !menu && !asked && self.model.shows_episode();
             if free
                 && ctx.input_mut(|input| input.consume_key(egui::Modifiers::NONE, key))
                 && entry.is_available(&self.model)

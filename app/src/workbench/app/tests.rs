@@ -307,3 +307,32 @@ fn what_is_on_the_window_is_shared_as_a_page_with_notes_that_are_not_saved() {
     assert!(html.starts_with("<!DOCTYPE html>") && html.contains("id=\"part-a-states\""));
     assert!(session.unsaved, "sharing saves nothing");
 }
+
+#[test]
+fn whoever_is_new_is_shown_around_once_and_its_keys_reach_nothing_else() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 2);
+    harness.state_mut().is_new = true;
+    harness.run_steps(2);
+    assert_eq!(harness.state().tour, None, "nothing is shown before there is a step to show");
+    harness.state_mut().ask(Command::DoIt);
+    wait(&mut harness);
+    assert!(harness.query_by_label("The belief").is_some());
+    // Enter goes to the next stop, and does no step of the episode behind it.
+    for title in ["The decision", "Step by step", "The clock", "Other questions"] {
+        harness.key_press(re_viewer::external::egui::Key::Enter);
+        harness.run_steps(2);
+        assert!(harness.query_by_label(title).is_some(), "{title}");
+    }
+    harness.get_by_label("Done").click();
+    harness.run_steps(2);
+    let app = harness.state();
+    assert!((app.tour, app.is_new, app.model.kept.toured) == (None, false, true));
+    assert!(app.model.session().is_some_and(|session| session.steps() == 1 && session.activity == Activity::Idle));
+    harness.state_mut().ask(Command::Menu(MenuCommand::Tour));
+    harness.run_steps(2);
+    assert!(harness.query_by_label("The belief").is_some(), "the help menu shows it again");
+    harness.key_press(re_viewer::external::egui::Key::Escape);
+    harness.run_steps(2);
+    assert!(harness.state().tour.is_none() && harness.state().model.session().is_some());
+}

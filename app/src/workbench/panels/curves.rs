@@ -9,7 +9,7 @@ use crate::workbench::session::Session;
 use egui_plot::{AxisHints, GridMark, Line, LineStyle, MarkerShape, Plot, PlotPoint, Points, VLine};
 use nudge_core::plan::Action;
 use re_viewer::external::egui::{
-    Color32, CursorIcon, Rangef, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2,
+    Color32, CursorIcon, Label, Rangef, RichText, Sense, Stroke, Ui, WidgetInfo, WidgetType, vec2,
 };
 
 /// The scores between 0 and 1 that are drawn.
@@ -162,23 +162,21 @@ impl Curves<'_> {
             value.map_or_else(|| "n/a".to_owned(), |value| words::significant(value, 3))
         };
         ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing = vec2(5.0, 1.0);
+            ui.spacing_mut().item_spacing = vec2(12.0, 1.0);
             for series in series {
-                let (rect, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
-                let ink = legend::line_ink(ui, series.rgb);
-                ui.painter().hline(rect.x_range(), rect.center().y, Stroke::new(2.0, ink));
-                ui.label(RichText::new(series.title).small()).on_hover_text(series.hint);
                 let value = match self.other {
                     None => at(self.session, series),
                     Some(other) => format!("A {} B {}", at(self.session, series), at(other, series)),
                 };
-                ui.label(words::figure(value).strong());
-                ui.add_space(6.0);
+                legend::line(ui, series.rgb, series.title, &value).on_hover_text(series.hint);
             }
+            let mut remark = |words: &str| {
+                ui.add(Label::new(RichText::new(words).small().weak()).extend());
+            };
             if self.other.is_some() && series.len() > 1 {
-                ui.label(RichText::new("A solid, B dashed, dotted: first difference").small().weak());
+                remark("A solid, B dashed, dotted: first difference");
             } else if !self.pushes([0.0, 1.0]).is_empty() {
-                ui.label(RichText::new("triangle: push").small().weak());
+                remark("triangle: push");
             }
         });
     }

@@ -10,6 +10,7 @@ use re_viewer::external::egui;
 pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<Command>) {
     let size = model.session().map_or([0.80, 0.40, 0.40], |session| session.record.scene.shelf.size);
     let layout = model.kept.layout;
+    let has_truth = model.session().is_none_or(|session| session.record.has_truth());
     let most = model
         .gain_source
         .as_ref()
@@ -68,7 +69,10 @@ pub fn show(ui: &mut egui::Ui, model: &mut Model, drawn: usize, _ask: &mut Vec<C
         }
     });
     ui.horizontal_wrapped(|ui| {
-        ui.checkbox(&mut display.truth, "truth").on_hover_text("The outlines of the true objects");
+        // A recording has no truth to show; that it has none, the episode says once.
+        if has_truth {
+            ui.checkbox(&mut display.truth, "truth").on_hover_text("The outlines of the true objects");
+        }
         ui.checkbox(&mut display.views, "views").on_hover_text("The candidate views as frusta, coloured by gain");
         ui.checkbox(&mut display.pushes, "pushes").on_hover_text("The push candidates as arrows, coloured by value");
         if layout != LayoutKind::Compare {

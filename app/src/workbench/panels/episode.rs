@@ -1,11 +1,13 @@
 //! The episode at the left: its scene, how it is run, what can be done next, and the other open episodes.
 
+use super::tour;
 use crate::driver::{BELIEFS, belief_title, belief_update};
 use crate::workbench::command::{Command, MenuCommand};
 use crate::workbench::model::{Model, StartForm};
 use crate::workbench::session::{Activity, Session, SessionId};
 use nudge_core::camera::{NoiseModel, ViewArray};
-use nudge_core::plan::{Place, PlannerSettings, PolicyKind, SETTINGS, Setting, Values};
+use nudge_core::episode::{EpisodeRecord, StepRecord};
+use nudge_core::plan::{Place, PlannerSettings, PolicyKind, Reason, SETTINGS, Setting, Values};
 use nudge_core::skill::{SkillKind, SkillSet};
 use re_viewer::external::egui;
 use std::collections::BTreeMap;
@@ -71,7 +73,7 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
         ui.label(format!("{} objects, {count} hidden", scene.objects.len())).on_hover_text(words);
     }
     let mut facts = vec![
-        ("policy", config.policy.to_string()),
+        chosen_by(&session.record),
         ("belief", belief_title(&config.belief).to_owned()),
         ("seed", config.seed.to_string()),
         ("budget", format!("{} actions", config.budget)),
@@ -89,8 +91,20 @@ fn scene(ui: &mut egui::Ui, session: &Session) {
     });
 }
 
+/// Who chose the views: the policy, or nobody where the frames of a recording were taken in their own order.
+fn chosen_by(record: &EpisodeRecord) -> (&'static str, String) {
+    let is_unweighed = |step: &StepRecord| step.decision.reason == Reason::Manual;
+    let is_recorded = !record.has_truth() && record.config.views == ViewArray::RECORDED;
+    if is_recorded && !record.steps.is_empty() && record.steps.iter().all(is_unweighed) {
+        ("frames", "in recorded order".to_owned())
+    } else {
+        ("policy", record.config.policy.to_string())
+    }
+}
+
 fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Command>) {
     super::framed(ui);
+    let top = ui.cursor().min;
     // While it runs, the button that began the run pauses it.
     let runs = session.activity == Activity::Running;
     let run = if runs { MenuCommand::Pause } else { MenuCommand::Run };
@@ -105,6 +119,8 @@ fn doing(ui: &mut egui::Ui, model: &Model, session: &Session, ask: &mut Vec<Comm
             }
         });
     }
+    let bottom = egui::pos2(ui.max_rect().right(), ui.cursor().top());
+    tour::mark(ui.ctx(), tour::Spot::Doing, egui::Rect::from_min_max(top, bottom).expand(3.0));
     let (steps, budget) = (session.steps(), session.record.config.budget);
     let doing = match session.activity {
         Activity::Idle if session.is_finished() => "the budget is used up",

@@ -83,6 +83,27 @@ pub fn swatches(ui: &mut Ui, entries: impl IntoIterator<Item = (Rgb, String)>) {
     });
 }
 
+/// A line of one colour with its name and its value: one piece, which no line break parts.
+pub fn line(ui: &mut Ui, rgb: Rgb, name: &str, value: &str) -> Response {
+    let [sample, gap] = [14.0, 5.0];
+    let (text, ink) = (ui.visuals().text_color(), line_ink(ui, rgb));
+    let strong = ui.visuals().strong_text_color();
+    let name_drawn = ui.painter().layout_no_wrap(name.to_owned(), small(ui), text);
+    let value_drawn = ui.painter().layout_no_wrap(value.to_owned(), small(ui), strong);
+    let (name_px, value_px) = (name_drawn.size(), value_drawn.size());
+    let size = vec2(sample + gap + name_px.x + gap + value_px.x, name_px.y.max(value_px.y));
+    let (rect, response) = ui.allocate_exact_size(size, Sense::hover());
+    response.widget_info(|| WidgetInfo::labeled(WidgetType::Label, true, format!("{name} {value}")));
+    if ui.is_rect_visible(rect) {
+        let y = rect.center().y;
+        ui.painter().hline(rect.left()..=rect.left() + sample, y, Stroke::new(2.0, ink));
+        let at = rect.left() + sample + gap;
+        ui.painter().galley(pos2(at, y - 0.5 * name_px.y), name_drawn, text);
+        ui.painter().galley(pos2(at + name_px.x + gap, y - 0.5 * value_px.y), value_drawn, strong);
+    }
+    response
+}
+
 /// One colour with its name.
 pub fn swatch(ui: &mut Ui, rgb: Rgb, name: &str) -> Response {
     const SIDE: f32 = 9.0;

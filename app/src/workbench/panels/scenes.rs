@@ -1,4 +1,5 @@
-//! The scenes to choose from, as cards: a picture, a name, a line, and how much is hidden.
+//! The opening page: episodes and recordings to open and scenes to start from, as cards with a picture, a name, a line, and a few
+//! facts.
 
 #[cfg(test)]
 mod tests;
@@ -54,8 +55,8 @@ fn head(ui: &mut egui::Ui, browser: &mut Browser, goes_back: bool, wake: &Wake, 
         if goes_back && ui.button("Back").on_hover_text("Go back to the open episode (Esc)").clicked() {
             ask.push(Command::Browse(false));
         }
-        let search = egui::TextEdit::singleline(&mut browser.search).hint_text("Search scenes").desired_width(150.0);
-        named(ui.add(search), "Search scenes");
+        let search = egui::TextEdit::singleline(&mut browser.search).hint_text("Search").desired_width(150.0);
+        named(ui.add(search), "Search");
         let typed = egui::TextEdit::singleline(&mut browser.typed).hint_text("Path of a scene or an episode");
         let response = named(ui.add(typed.desired_width(220.0)), "Path of a scene or an episode");
         let entered = response.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
@@ -129,13 +130,17 @@ fn cards(ui: &mut egui::Ui, browser: &mut Browser, chosen: &mut Option<PathBuf>,
     let room = ui.available_width() - 8.0;
     let columns = ((room + GAP) / (CARD + GAP)).floor().max(1.0);
     let width = ((room - GAP * (columns - 1.0)) / columns).min(WIDEST_CARD);
-    let shown: Vec<usize> =
-        (0..browser.entries().len()).filter(|at| browser.entries()[*at].matches(&browser.search)).collect();
+    let shown = browser.hits();
+    let is_search = !browser.search.trim().is_empty();
     if shown.is_empty() {
         ui.add_space(20.0);
         ui.vertical_centered(|ui| ui.weak(format!("Nothing matches “{}”", browser.search.trim())));
     }
-    let group = |at: &usize| browser.entries()[*at].group.clone();
+    let hits = match shown.len() {
+        1 => "One hit".to_owned(),
+        count => format!("{count} hits, the best first"),
+    };
+    let group = |at: &usize| if is_search { hits.clone() } else { browser.entries()[*at].group.clone() };
     let groups: Vec<(String, Vec<usize>)> =
         shown.chunk_by(|a, b| group(a) == group(b)).map(|chunk| (group(&chunk[0]), chunk.to_vec())).collect();
     for (title, group) in groups {
@@ -177,6 +182,7 @@ fn card(
     if response.clicked() || response.double_clicked() {
         match &entry.look {
             Look::Broken(error) => ask.push(Command::Tell(Level::Error, error.clone())),
+            Look::Unknown | Look::Sound(_) if entry.is_opened() => ask.push(Command::Open(entry.path.clone())),
             Look::Unknown | Look::Sound(_) => {
                 *chosen = Some(entry.path.clone());
                 if response.double_clicked() {
@@ -187,6 +193,7 @@ fn card(
     }
     response.on_hover_text(match &entry.look {
         Look::Broken(error) => error.clone(),
+        _ if entry.is_opened() => format!("{}\nClick to open", entry.path.display()),
         _ => format!("{}\nClick to choose, double click to start", entry.path.display()),
     });
 }
@@ -196,16 +203,8 @@ fn describe(entry: &Entry) -> String {
     let stem = || entry.path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     match &entry.look {
         Look::Unknown => stem(),
-        Look::Sound(facts) => format!("{}, {}", facts.name, counts(facts.objects, facts.hidden)),
+        Look::Sound(facts) => format!("{}, {}", facts.text.name, facts.text.about.words()),
         Look::Broken(error) => format!("{}, cannot be read: {error}", stem()),
-    }
-}
-
-fn counts(objects: usize, hidden: Option<usize>) -> String {
-    let noun = if objects == 1 { "object" } else { "objects" };
-    match hidden {
-        Some(hidden) => format!("{objects} {noun}, {hidden} hidden"),
-        None => format!("{objects} {noun}"),
     }
 }
 
@@ -224,20 +223,29 @@ fn draw(ui: &egui::Ui, rect: Rect, response: &egui::Response, entry: &mut Entry,
             line(&painter, text.min, &name, 13.5, ink, text.width(), 1);
         }
         Look::Sound(facts) => {
-            let texture = entry.texture.get_or_insert_with(|| {
-                let size = [facts.picture.width() as usize, facts.picture.height() as usize];
-                let image = egui::ColorImage::from_rgb(size, facts.picture.as_raw());
-                ui.ctx().load_texture(entry.path.display().to_string(), image, egui::TextureOptions::LINEAR)
-            });
             let mut top = egui::CornerRadius::same(radius as u8);
             (top.sw, top.se) = (0, 0);
-            cover(&painter, picture, texture, top);
-            let below = line(&painter, text.min, &facts.name, 13.5, ink, text.width(), 1);
+            match &facts.picture {
+                Some(drawn) => {
+                    let texture = entry.texture.get_or_insert_with(|| {
+                        let size = [drawn.width() as usize, drawn.height() as usize];
+                        let image = egui::ColorImage::from_rgb(size, drawn.as_raw());
+                        ui.ctx().load_texture(entry.path.display().to_string(), image, egui::TextureOptions::LINEAR)
+                    });
+                    cover(&painter, picture, texture, top);
+                }
+                None => {
+                    painter.rect_filled(picture, top, visuals.extreme_bg_color);
+                    let (at, font) = (picture.center(), FontId::proportional(26.0));
+                    painter.text(at, egui::Align2::CENTER_CENTER, "⏵", font, visuals.weak_text_color());
+                }
+            }
+            let below = line(&painter, text.min, &facts.text.name, 13.5, ink, text.width(), 1);
             let weak = visuals.weak_text_color();
             let about = Pos2::new(text.left(), below + 1.0);
-            line(&painter, about, &facts.description, LEAST_SIZE, weak, text.width(), 2);
+            line(&painter, about, &facts.text.description, LEAST_SIZE, weak, text.width(), 2);
             let foot = Pos2::new(text.left(), text.bottom() - 13.0);
-            let known = counts(facts.objects, facts.hidden);
+            let known = facts.text.about.words();
             line(&painter, foot, &known, LEAST_SIZE, visuals.text_color(), text.width(), 1);
         }
         Look::Broken(error) => {

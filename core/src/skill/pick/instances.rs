@@ -61,7 +61,7 @@ impl<'a> Front<'a> {
     fn of(patch: &'a Patch, grid: &'a Grid, from: usize) -> Option<Self> {
         let [width, depth, _] = grid.dims;
         let at = from / depth;
-        let first = |x: usize| (0..depth).find(|y| patch.contains(x * depth + y));
+        let first = |x: usize| first_row(patch, depth, x);
         let runs_on =
             |x: usize, next: usize| first(x).zip(first(next)).is_some_and(|(a, b)| a.abs_diff(b) <= STEP_ROWS);
         first(at)?;
@@ -95,11 +95,16 @@ impl<'a> Front<'a> {
         let is_of = |cell: usize| {
             let (x, y) = (cell / depth, cell % depth);
             let in_columns = self.columns.contains(&x) && (((x - first) as f32 + 0.5) / width) as usize == number;
-            let front = (0..depth).find(|y| self.patch.contains(x * depth + y)).unwrap_or(depth);
+            let front = first_row(self.patch, depth, x).unwrap_or(depth);
             in_columns && ((y - front) as f32) < rows + 0.5
         };
         Some(self.patch.part(is_of))
     }
+}
+
+/// The first row of a patch in a column of a floor plan of so many rows.
+fn first_row(patch: &Patch, depth: usize, x: usize) -> Option<usize> {
+    (0..depth).find(|y| patch.contains(x * depth + y))
 }
 
 #[cfg(test)]

@@ -1,7 +1,12 @@
 use super::*;
+use crate::workbench::browser::{About, Folders};
 use crate::workbench::panels::photo;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
+
+fn scenes(folder: &Path) -> Folders {
+    Folders { scenes: folder.to_owned(), ..Folders::default() }
+}
 
 struct Stage {
     model: Model,
@@ -31,7 +36,7 @@ fn folder() -> tempfile::TempDir {
 
 fn harness(folder: &Path) -> Harness<'static, Stage> {
     let draw = |ui: &mut egui::Ui, stage: &mut Stage| show(ui, &mut stage.model, &mut stage.asked);
-    let model = Model { browser: Browser::of(folder), ..Model::default() };
+    let model = Model { browser: Browser::of(scenes(folder)), ..Model::default() };
     let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(draw, Stage { model, asked: vec![] });
     wait_for(&mut harness, "alpha, 1 object, 0 hidden");
     wait_for(&mut harness, "beta, 1 object, 0 hidden");
@@ -92,10 +97,48 @@ fn searching_leaves_what_matches_and_a_typed_path_opens() {
 }
 
 #[test]
+fn what_a_search_hits_by_name_comes_before_what_it_hits_by_path() {
+    let folder = folder();
+    let path = folder.path().join("beta");
+    std::fs::create_dir_all(&path).expect("made");
+    std::fs::copy(folder.path().join("easy/alpha.toml"), path.join("alpha.toml")).expect("copied");
+    let mut harness = harness(folder.path());
+    harness.state_mut().model.browser.search = "beta".to_owned();
+    harness.run_steps(2);
+    assert!(harness.query_by_label("2 hits, the best first").is_some());
+    let top = |label: &str| harness.query_all_by_label(label).next().expect("a card").rect().left_top();
+    let (by_name, by_path) = (top("beta, 1 object, 0 hidden"), top("alpha, 1 object, 0 hidden"));
+    assert!((by_name.y, by_name.x) < (by_path.y, by_path.x), "{by_name:?} {by_path:?}");
+}
+
+#[test]
+fn an_episode_comes_first_and_a_click_opens_it() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    std::fs::create_dir_all(out.join("mine")).expect("made");
+    let record = crate::workbench::fixture::session(0).record;
+    std::fs::write(out.join("mine/episode.json"), serde_json::to_vec(&record).expect("JSON")).expect("written");
+    std::fs::write(out.join("loose.rrd"), "a recording").expect("written");
+    let draw = |ui: &mut egui::Ui, stage: &mut Stage| show(ui, &mut stage.model, &mut stage.asked);
+    let folders = Folders { episodes: Some(out.clone()), ..scenes(folder.path()) };
+    let model = Model { browser: Browser::of(folders), ..Model::default() };
+    let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(draw, Stage { model, asked: vec![] });
+    let done = format!("{} of {} actions", record.steps.len(), record.config.budget);
+    wait_for(&mut harness, &done);
+    wait_for(&mut harness, "loose, recording");
+    wait_for(&mut harness, "alpha, 1 object, 0 hidden");
+    let top = |text: &str| harness.query_all_by_label_contains(text).next().expect("a card").rect().top();
+    assert!(top(&done) < top("alpha, 1 object"));
+    harness.query_all_by_label_contains(&done).next().expect("a card").click();
+    harness.run_steps(2);
+    assert!(matches!(&harness.state().asked[..], [Command::Open(path)] if *path == out.join("mine")));
+}
+
+#[test]
 fn a_folder_without_scenes_says_so() {
     let folder = tempfile::tempdir().expect("folder");
     let draw = |ui: &mut egui::Ui, stage: &mut Stage| show(ui, &mut stage.model, &mut stage.asked);
-    let model = Model { browser: Browser::of(&folder.path().join("none")), ..Model::default() };
+    let model = Model { browser: Browser::of(scenes(&folder.path().join("none"))), ..Model::default() };
     let mut harness = Harness::builder().with_size([700.0, 500.0]).build_ui_state(draw, Stage { model, asked: vec![] });
     wait_for(&mut harness, "No scenes here");
 }
@@ -105,7 +148,7 @@ fn a_folder_without_scenes_says_so() {
 fn pictures() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("workspace");
     let broken = folder();
-    let mut model = Model { browser: Browser::of(&root.join("scenes")), ..Model::default() };
+    let mut model = Model { browser: Browser::of(scenes(&root.join("scenes"))), ..Model::default() };
     model.kept.form.scene = Some(root.join("scenes/high/tunnel.toml"));
     model.kept.recent = vec![broken.path().join("hard/broken.toml")];
     let draw = |ui: &mut egui::Ui, stage: &mut Stage| show(ui, &mut stage.model, &mut stage.asked);
@@ -113,7 +156,7 @@ fn pictures() {
         let entries = stage.model.browser.entries();
         let is_known = |entry: &Entry| match &entry.look {
             Look::Unknown => false,
-            Look::Sound(facts) => facts.hidden.is_some(),
+            Look::Sound(facts) => !matches!(facts.text.about, About::Scene { hidden: None, .. }),
             Look::Broken(_) => true,
         };
         !entries.is_empty() && entries.iter().all(is_known)

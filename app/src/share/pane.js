@@ -36,8 +36,8 @@ class Pane {
     const { occupancy, classes } = episode.beliefAt(step);
     const truth = colour === "error" ? episode.truthAt(step) : null;
     const least = Math.floor(above * 255 + 1e-6);
-    const shown = Uint8Array.from(occupancy, (byte) => (byte > least ? 1 : 0));
-    if (truth) truth.occupancy.forEach((isThere, at) => isThere && (shown[at] = 1));
+    const shown = new Uint8Array(occupancy.length);
+    for (let at = 0; at < shown.length; at++) shown[at] = occupancy[at] > least || (truth && truth.occupancy[at]) ? 1 : 0;
     const outside = countOutside(dims, shown);
     const colourOf = this.colouring(colour, { occupancy, classes, truth, least });
     let [edge, size, blocks, paint, count] = [1, dims, shown, colourOf, outside];

@@ -3,15 +3,18 @@ use crate::annotations::Annotations;
 use crate::fixture;
 use nudge_core::episode::Judgement;
 use std::path::PathBuf;
+use std::sync::LazyLock;
+
+static PLAYED: LazyLock<fixture::Played> = LazyLock::new(|| fixture::play(5));
 
 /// A played episode as files.
 fn filed(folder: &Path, name: &str, change: impl Fn(&mut EpisodeRecord)) -> PathBuf {
-    let played = fixture::play(5);
-    let mut record = played.record;
+    let played = &*PLAYED;
+    let mut record = played.record.clone();
     change(&mut record);
     let truths = played.truths.iter().map(|truth| record.has_truth().then_some(truth));
     let directory = folder.join(name);
-    EpisodeDir::store(&directory, &record, played.beliefs.into_iter().zip(truths)).expect("stored");
+    EpisodeDir::store(&directory, &record, played.beliefs.iter().cloned().zip(truths)).expect("stored");
     directory
 }
 

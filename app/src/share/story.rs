@@ -19,8 +19,6 @@ const LISTED: usize = 6;
 pub struct Story {
     /// `tunnel, mem, seed 3`.
     pub title: String,
-    /// The scene's name.
-    pub scene: String,
     /// What the scene is.
     pub description: String,
     /// What it was run with, and by what it was made: name and value.
@@ -155,7 +153,6 @@ pub fn tell(record: &EpisodeRecord, annotations: &Annotations) -> Story {
     }
     Story {
         title: format!("{}, {}, seed {}", scene.name, config.policy, config.seed),
-        scene: scene.name.clone(),
         description: capital(&scene.description),
         facts,
         budget: config.budget,
@@ -270,10 +267,10 @@ fn drawn(decision: &Decision) -> String {
     let mut reasons: Vec<(String, usize)> = reasons.into_iter().collect();
     reasons.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
     let told: Vec<String> = reasons.iter().take(3).map(|(words, count)| format!("{count} because {words}")).collect();
-    match told.is_empty() {
-        true => format!("{all} drawn, all feasible."),
-        false => format!("{all} drawn, {} feasible; rejected: {}.", all - rejected, told.join("; ")),
+    if told.is_empty() {
+        return format!("{all} drawn, all feasible.");
     }
+    format!("{all} drawn, {} feasible; rejected: {}.", all - rejected, told.join("; "))
 }
 
 fn verdicts(step: &StepRecord, annotations: &Annotations) -> Vec<(&'static str, Vec<String>)> {

@@ -29,6 +29,7 @@ mod robot;
 mod run;
 mod scene;
 mod settings;
+mod share;
 #[cfg(feature = "workbench")]
 mod shot;
 mod train;
@@ -74,6 +75,8 @@ enum Command {
     Probe(probe::Args),
     /// Hold the scores of a small fixed bench against golden ones
     Regress(regress::Args),
+    /// Make one page that anyone can open, of an episode or of two beside each other
+    Share(share::Args),
     /// Make a page of tables and charts of a bench
     Report(report::Args),
     /// Make, check, generate, rescale and draw scenes
@@ -143,6 +146,7 @@ pub fn main() -> ExitCode {
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Probe(args)) => probe::run(&args),
         Some(Command::Regress(args)) => regress::run(&args),
+        Some(Command::Share(args)) => share::run(&args),
         Some(Command::Report(args)) => report::run(&args),
         Some(Command::Scene(args)) => scene::run(&args),
         Some(Command::Robot(args)) => robot::run(&args),

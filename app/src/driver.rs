@@ -28,8 +28,8 @@ use std::time::Instant;
 
 pub mod own;
 
-/// File of the recording in an episode's directory.
-pub const RECORDING: &str = "episode.rrd";
+pub use crate::record::RECORDING;
+
 /// File of the summary figure in an episode's directory.
 pub const SUMMARY: &str = "summary.png";
 

@@ -8,6 +8,7 @@
 #[macro_use]
 mod output;
 
+pub mod annotations;
 pub mod bench;
 pub mod colors;
 pub mod commands;
@@ -22,6 +23,7 @@ pub mod planner_args;
 pub mod record;
 pub mod regress;
 pub mod report;
+pub mod share;
 pub mod verdicts;
 #[cfg(feature = "workbench")]
 pub mod workbench;

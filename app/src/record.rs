@@ -45,6 +45,8 @@ use std::path::{Path, PathBuf};
 
 /// The application id of every recording; the viewer keeps one layout per application.
 pub const APPLICATION: &str = "nudge";
+/// File of the recording in an episode's directory.
+pub const RECORDING: &str = "episode.rrd";
 
 /// What does not change during an episode.
 #[derive(Clone, Copy)]

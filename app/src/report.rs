@@ -19,4 +19,5 @@ mod words;
 pub use markdown::markdown;
 pub use page::{Page, write};
 pub use results::{Cell, Metric, Results};
+pub use scenes::Pages;
 pub use words::made_by;

@@ -5,7 +5,6 @@
 //! threads (`worker`), floor maps and answers are made in the background (`latest`), files are written by tasks (`tasks`),
 //! and `viewer` alone touches Rerun's viewer. `shot` renders the same window without a display.
 
-pub mod annotations;
 pub mod app;
 pub mod author;
 pub mod browser;

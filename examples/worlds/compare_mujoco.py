@@ -3,6 +3,7 @@
 
     compare_mujoco.py images EPISODE...     the same views in both: the looks of built-in episodes before their first push
     compare_mujoco.py pushes EPISODE...     the same motions in both: the pushes of built-in episodes
+    compare_mujoco.py picks EPISODE...      the same for picks, each from where the objects stood before it
     compare_mujoco.py scores EPISODE THERE TRUTH    the last maps of a built-in episode and of one in MuJoCo (THERE), of which
                                             the world wrote the truth (--truth TRUTH)
 """
@@ -25,6 +26,10 @@ NEAR_M = 0.005
 # An object has moved by more than this, metres; it is toppled when it is lower by this share.
 MOVED_M = 0.005
 TOPPLED = 0.25
+
+
+# A footprint that shares less than this with what it was has not only been moved along.
+SAME_FOOTPRINT = 0.8
 
 
 def is_push(step: dict) -> bool:
@@ -100,7 +105,7 @@ class There:
         """Ways of the middles, how many toppled, the sum of displacements, mm, how many left the shelf, whether it stalled."""
         before, origins = self.standing()
         gone = int(self.shelf.gone.sum())
-        _, stalled = self.shelf.carry_out(motion_of(step))
+        stalled = self.shelf.carry_out(motion_of(step)).stalled
         after, moved_origins = self.standing()
         ways, toppled = moved(before, after)
         way_mm = 1000 * np.linalg.norm(moved_origins - origins, axis=1)[~self.shelf.gone].sum()
@@ -167,6 +172,83 @@ def summary(name: str, rows: list[tuple[int, float, float, list[float]]]) -> Non
         print(f"{len(off)} objects moved; ways differ by {middle:.1f} mm in the median, {tail:.1f} mm for nine of ten.")
 
 
+def stood(first: np.ndarray, now: np.ndarray, voxel_m: float) -> tuple[dict[int, np.ndarray], set[int], list[int]]:
+    """What has become of the objects of an episode, from two maps of them: how far each has moved that has, metres, which are
+    gone, and which do not stand as they did."""
+    moves, gone, turned = {}, set(), []
+    for at in np.unique(first[first < 65535]).tolist():
+        cells, there = np.argwhere(first == at), np.argwhere(now == at)
+        if len(there) == 0:
+            gone.add(at)
+            continue
+        way = there.mean(axis=0) - cells.mean(axis=0)
+        if np.linalg.norm(way) * voxel_m > 0.5 * MOVED_M:
+            moves[at] = way * voxel_m
+        both = set(map(tuple, cells + np.round(way).astype(int))) & set(map(tuple, there))
+        if len(both) < SAME_FOOTPRINT * max(len(cells), len(there)):
+            turned.append(at)
+    return moves, gone, turned
+
+
+def carried_there(scene: dict, step: dict, moves: dict[int, np.ndarray], gone: set[int]) -> dict:
+    """What a pick does in MuJoCo, with the objects standing so: the end of the grip, the object, the load on the cup, by how much
+    the others were displaced in sum, mm, and how many left the shelf."""
+    shelf = Shelf(scene)
+    for at, way in moves.items():
+        shelf.data.qpos[shelf.at_qpos[at] :][:2] += way
+    for at in gone:
+        shelf.take_away(at)
+    shelf.settle()
+    origins, left = np.array([pose["position"] for pose in shelf.poses()]), int(shelf.gone.sum())
+    moved = shelf.carry_out(motion_of(step))
+    ways = np.linalg.norm(np.array([pose["position"] for pose in shelf.poses()]) - origins, axis=1)
+    ways[shelf.gone] = 0.0
+    if moved.grip == "set_down":
+        ways[moved.object] = 0.0
+    name = None if moved.object is None else shelf.things[moved.object].name
+    left = int((shelf.gone & ~shelf.stowed).sum() - left)
+    end = "stalled" if moved.stalled else moved.grip
+    return {"end": end, "object": name, "load": moved.load, "sum": 1000 * float(ways.sum()), "left": left}
+
+
+def picks(folders: list[Path]) -> None:
+    """Compares what the picks of episodes do: here in the built-in simulator, there in MuJoCo, each from where the objects stood
+    before it here. What stood otherwise than moved along cannot be put there from the files: such picks are left out."""
+    table("episode, step", "end", "object", "displaced, mm", "left", "pull, N", "moment, Nm")
+    rows: list[tuple[dict, dict]] = []
+    out = 0
+    for folder in folders:
+        episode = read_episode(folder)
+        scene, last = episode["scene"], 0
+        first = np.load(folder / "truth" / "000.npz")["objects"]
+        for step in filter(is_push, episode["steps"]):
+            before, last = last, step["index"]
+            moves, gone, turned = stood(first, np.load(folder / "truth" / f"{before:03}.npz")["objects"], scene["shelf"]["voxel_m"])
+            if step["action"]["kind"] != "pick" or turned:
+                out += step["action"]["kind"] == "pick"
+                continue
+            grip = step["push"].get("grip") or {"end": "stalled", "object": None}
+            here = {**grip, "sum": 1000 * step["displacement_m"], "left": len(step["dropped"])}
+            there = carried_there(scene, step, moves, gone)
+            rows.append((here, there))
+            both = [f"{here[name]} / {there[name]}" for name in ("end", "object")]
+            sums = f"{here['sum']:.1f} / {there['sum']:.1f}"
+            load = ["{:.1f}".format(there["load"][0]), "{:.2f}".format(there["load"][1])] if there["object"] else ["–", "–"]
+            row(f"`{folder.name}`, {last}", *both, sums, f"{here['left']} / {there['left']}", *load)
+    picks_in_all(rows, out)
+
+
+def picks_in_all(rows: list[tuple[dict, dict]], out: int) -> None:
+    """What picks say together."""
+    same = [here["end"] == there["end"] and here["object"] == there["object"] for here, there in rows]
+    print(f"\n{sum(same)} of {len(rows)} picks end the same and with the same object; {out} left out.")
+    for pair in sorted({(here["end"], there["end"]) for here, there in rows}):
+        count = sum((here["end"], there["end"]) == pair for here, there in rows)
+        print(f"{pair[0]} here, {pair[1]} there: {count}.")
+    sums = np.array([(here["sum"], there["sum"]) for here, there in rows]).reshape(-1, 2)
+    print("Objects displaced in sum, mm: {:.1f} here, {:.1f} there.".format(*sums.sum(axis=0)))
+
+
 def judged(there: Path, truth_file: Path, scene: dict) -> dict[str, float]:
     """The scores of the last belief of an episode in MuJoCo."""
     lines = truth_file.read_text(encoding="utf-8").splitlines()
@@ -191,7 +273,7 @@ def compare_scores(folder: Path, there: Path, truth_file: Path) -> None:
 def main() -> None:
     """Does what was typed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["images", "pushes", "scores"])
+    parser.add_argument("what", choices=["images", "pushes", "picks", "scores"])
     parser.add_argument("paths", nargs="+", type=Path)
     parser.add_argument("--renderer", choices=["rays", "gl"], default="rays")
     typed = parser.parse_args()
@@ -199,6 +281,8 @@ def main() -> None:
         images(typed.paths, typed.renderer)
     elif typed.what == "pushes":
         pushes(typed.paths)
+    elif typed.what == "picks":
+        picks(typed.paths)
     else:
         compare_scores(*typed.paths)
 

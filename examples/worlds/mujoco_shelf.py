@@ -3,7 +3,10 @@
 
     nudge run shelf.toml --world "python3 examples/worlds/mujoco_shelf.py" --policy mem --budget 20
 
-Looks are rendered by MuJoCo, motions of the arm are carried out in its physics. Needs Python 3.11, `pip install mujoco numpy`.
+    nudge run shelf.toml --world "python3 examples/worlds/mujoco_shelf.py" --policy mem-pick --place tray --arm suction
+
+Looks are rendered by MuJoCo; pushes, and picks by an arm with a suction cup, are carried out in its physics. Needs Python 3.11,
+`pip install mujoco numpy`.
 """
 
 import argparse
@@ -57,9 +60,10 @@ class Server:
             raise KeyError("begin")
         if "look" in request:
             return self.look(request["look"])
-        passed, stalled = self.shelf.carry_out(request["move"])
+        moved = self.shelf.carry_out(request["move"])
         self.tell_truth("a")
-        return {"moved": {"passed": passed, "stalled": stalled}}
+        grip = {"grip": moved.grip} if moved.grip else {}
+        return {"moved": {"passed": moved.passed, "stalled": moved.stalled, **grip}}
 
     def begin(self, begin: dict) -> dict:
         """Builds the world, and carries out again what was done."""

@@ -1,7 +1,7 @@
 //! `nudge report`: what a bench measured, as a page or as Markdown.
 
 use super::print;
-use crate::report::{Results, made_by, markdown, write};
+use crate::report::{Pages, Results, made_by, markdown, write};
 use std::path::PathBuf;
 
 /// What was typed.
@@ -15,6 +15,9 @@ pub struct Args {
     /// Print the tables as Markdown instead of making the page
     #[arg(long, conflicts_with = "out")]
     markdown: bool,
+    /// Also make a page of every recorded episode of the worst and best scenes, and link it
+    #[arg(long, conflicts_with = "markdown")]
+    pages: bool,
     /// Report what is there of an unfinished bench
     #[arg(long)]
     partial: bool,
@@ -27,7 +30,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return print(&markdown(&results)?);
     }
     let out = args.out.clone().unwrap_or_else(|| args.bench.join("report"));
-    let index = write(&results, &args.bench, &out)?;
+    let pages = if args.pages { Pages::Made } else { Pages::Left };
+    let index = write(&results, &args.bench, &out, pages)?;
     crate::output::print_error(&made_by(&results.plan).lines());
     print(&format!("{}\n", index.display()))
 }

@@ -2,11 +2,13 @@
 
 use super::charts::{self, Figure, SIZE};
 use super::results::Results;
+use super::scenes::Pages;
 use super::words::{self, Paragraph, count};
 use super::{picks, promises, scenes, tables};
 use crate::bench::SetPlan;
 use crate::figure::{PIXELS_PER_UNIT, escape};
 use crate::picture;
+use crate::share::{self, Source};
 use nudge_core::files::write_atomically;
 use nudge_core::scene::Catalog;
 use nudge_core::{Error, Result};
@@ -24,11 +26,12 @@ pub struct Page {
 }
 
 impl Page {
-    /// Makes the page of a bench. `bench_from_page` leads from the page to the bench's directory, for links.
+    /// Makes the page of a bench. `bench_from_page` leads from the page to the bench's directory, for links; pages of
+    /// episodes are linked where they are made.
     ///
     /// # Errors
     /// When a picture cannot be drawn.
-    pub fn new(results: &Results, bench_from_page: &Path) -> Result<Self> {
+    pub fn new(results: &Results, bench_from_page: &Path, pages: Pages) -> Result<Self> {
         let catalog = Catalog::standard();
         let plan = &results.plan;
         let mut charts = Vec::new();
@@ -59,7 +62,7 @@ impl Page {
             body += &picks::counted_twice(results, set).map_or(String::new(), |table| table.html());
             body += &promises::table(results, set).html();
             body += &tables::verdicts(results, set).html();
-            body += &scenes::extremes(results, set, &catalog, bench_from_page)?;
+            body += &scenes::extremes(results, set, &catalog, bench_from_page, pages)?;
         }
         let across = tables::across_sets(results);
         if !across.is_empty() {
@@ -100,9 +103,12 @@ fn colophon(results: &Results) -> String {
 /// Writes the report of the results of the bench in `bench` into `out`: the page last. Returns the page's path.
 ///
 /// # Errors
-/// What cannot be written; nothing is written before everything has been made.
-pub fn write(results: &Results, bench: &Path, out: &Path) -> Result<PathBuf> {
-    let page = Page::new(results, &way(bench, out)?)?;
+/// What cannot be written; nothing is written before everything has been made, but for the pages of episodes.
+pub fn write(results: &Results, bench: &Path, out: &Path, pages: Pages) -> Result<PathBuf> {
+    let page = Page::new(results, &way(bench, out)?, pages)?;
+    if pages == Pages::Made {
+        share_episodes(results, bench, out)?;
+    }
     fs::create_dir_all(out).map_err(|error| Error::io(out, error))?;
     for (name, png) in &page.charts {
         write_atomically(&out.join(format!("{name}.png")), png)?;
@@ -110,6 +116,18 @@ pub fn write(results: &Results, bench: &Path, out: &Path) -> Result<PathBuf> {
     let index = out.join(INDEX);
     write_atomically(&index, page.html.as_bytes())?;
     Ok(index)
+}
+
+/// Writes the pages of the episodes that the report links.
+fn share_episodes(results: &Results, bench: &Path, out: &Path) -> Result<()> {
+    for finished in (0..results.plan.sets.len()).flat_map(|set| scenes::recorded(results, set)) {
+        let Some(recording) = &finished.recording else { continue };
+        let page = out.join(scenes::page_of(results, finished.id));
+        let folder = page.parent().unwrap_or(out);
+        fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
+        share::write(&[Source::filed(&bench.join(recording))], &page, &|_| true)?;
+    }
+    Ok(())
 }
 
 /// The way from the page's folder to the bench: `..` where the page lies inside it.

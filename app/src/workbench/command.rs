@@ -93,6 +93,8 @@ pub enum MenuCommand {
     ExportTables,
     /// Exports the window as a picture.
     ExportPicture,
+    /// Writes the episode, or the two that are compared, as one page.
+    Share,
     /// Closes the episode that is shown.
     CloseEpisode,
     /// Ends the program.

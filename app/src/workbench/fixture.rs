@@ -126,7 +126,7 @@ impl Played {
             queued: false,
             pausing: false,
             read_only: None,
-            annotations: super::annotations::Annotations::default(),
+            annotations: crate::annotations::Annotations::default(),
             unsaved: false,
         }
     }

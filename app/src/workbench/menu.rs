@@ -21,6 +21,7 @@ pub const MENUS: [(&str, &[Option<M>]); 5] = [
             Some(M::ExportEpisode),
             Some(M::ExportTables),
             Some(M::ExportPicture),
+            Some(M::Share),
             None,
             Some(M::CloseEpisode),
             Some(M::Quit),
@@ -87,6 +88,7 @@ impl M {
             M::ExportEpisode => "Export episode…",
             M::ExportTables => "Export tables…",
             M::ExportPicture => "Export picture…",
+            M::Share => "Share as a page…",
             M::CloseEpisode => "Close episode",
             M::Quit => "Quit",
             M::Undo => "Undo",
@@ -128,6 +130,7 @@ impl M {
             M::ExportEpisode => "Write the episode with its notes as one directory and one self-contained recording",
             M::ExportTables => "Write scores, decisions and verdicts as CSV",
             M::ExportPicture => "Write the window, or a part of it, as a PNG",
+            M::Share => "Write the episode, or the two that are compared, as one HTML page that opens in any browser",
             M::CloseEpisode => "Close the episode that is shown; its directory stays",
             M::Quit => "End the program; asks first if notes or a scene are not saved",
             M::Undo => "Take the last change of the scene back",
@@ -198,7 +201,7 @@ impl M {
             M::ZoomOut => command(Key::Minus),
             M::Shortcuts => plain(Key::F1),
             M::EditScene => shifted(Key::D),
-            M::Panel(_) | M::ResetLayout | M::Tour | M::About => None,
+            M::Panel(_) | M::ResetLayout | M::Tour | M::About | M::Share => None,
         }
     }
 
@@ -210,7 +213,7 @@ impl M {
         match self {
             M::Save => authoring || model.session().is_some_and(|session| session.unsaved),
             M::SaveSceneAs | M::Undo | M::Redo | M::Duplicate | M::Delete => authoring,
-            M::ExportEpisode | M::ExportTables | M::CloseEpisode => session.is_some(),
+            M::ExportEpisode | M::ExportTables | M::Share | M::CloseEpisode => session.is_some(),
             M::StepBack | M::First => session.is_some() && model.cursor > 0,
             M::StepForward | M::Last => session.is_some() && model.cursor < model.last_step(),
             M::Decide | M::DoIt | M::Run => orders,

@@ -1,8 +1,8 @@
 //! One open episode as the window sees it: every state it went through, and what is being done with it.
 
-use super::annotations::Annotations;
 use super::half_belief::HalfBelief;
 use super::packed_frame::PackedFrame;
+use crate::annotations::Annotations;
 use crate::driver::default_out;
 use crate::record::decision::Series;
 use nudge_core::arm::ArmTool;

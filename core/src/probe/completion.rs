@@ -49,7 +49,7 @@ pub(super) fn worths(
 }
 
 /// A completion around what is shown, settled.
-fn completed(episode: &Episode, shown: &[Body], rng: &mut ChaCha8Rng) -> World {
+pub(super) fn completed(episode: &Episode, shown: &[Body], rng: &mut ChaCha8Rng) -> World {
     let (grid, seen) = (episode.grid(), episode.seen());
     let mut bodies: Vec<Body> = shown.to_vec();
     let mut placed: Vec<PlacedBody> = bodies.iter().map(PlacedBody::new).collect();

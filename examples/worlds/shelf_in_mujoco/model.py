@@ -13,6 +13,10 @@ SHELF_FRICTION = 0.5
 TOOL_FRICTION = 0.4
 # Groups of geoms: what is seen, and the arm, which is not.
 PANELS, OBJECTS, ARM = 1, 2, 3
+# Bits of what touches objects: what always does, and the hand, which does not touch what its suction cup holds.
+TOUCHED, BY_HAND = 1, 2
+# Stiffness of what holds an object on the cup: as that of a contact.
+WELD = {"solref": "0.006 1", "solimp": "0.95 0.99 0.0005"}
 
 FRAME = f"""
 <mujoco model="shelf">
@@ -67,7 +71,8 @@ def add_thing(world: ET.Element, assets: ET.Element, number: int, thing: Thing) 
     turn = [math.cos(half), 0.0, 0.0, math.sin(half)]
     body = ET.SubElement(world, "body", name=f"object{number}", pos=text([*thing.position, 0.0]), quat=text(turn))
     ET.SubElement(body, "freejoint", name=f"object{number}")
-    common = {"group": str(OBJECTS), "contype": "1", "conaffinity": "1", "friction": f"{thing.friction} 0.005 0.0001"}
+    common = {"group": str(OBJECTS), "contype": "1", "conaffinity": str(TOUCHED | BY_HAND)}
+    common["friction"] = f"{thing.friction} 0.005 0.0001"
     for part, corners in enumerate(thing.parts):
         name = f"object{number}.{part}"
         ET.SubElement(assets, "mesh", name=name, vertex=text(corners), inertia="convex")
@@ -80,6 +85,14 @@ def add_thing(world: ET.Element, assets: ET.Element, number: int, thing: Thing) 
         ET.SubElement(body, "geom", type=kind, size=size, pos=text([0, 0, height]), **common)
 
 
+def add_cup(root: ET.Element, tool: str, count: int) -> None:
+    """Adds what can hold an object on the cup, off as yet, for each of so many."""
+    equality = ET.SubElement(root, "equality")
+    for number in range(count):
+        ends = {"name": f"cup{number}", "body1": f"arm/{tool}", "body2": f"object{number}"}
+        ET.SubElement(equality, "weld", active="false", **ends, **WELD)
+
+
 def document(scene: dict) -> tuple[str, list[Thing], Robot]:
     """The model's text, with the objects and the arm that are in it."""
     things, robot = things_of(scene), robot_of(scene)
@@ -90,6 +103,8 @@ def document(scene: dict) -> tuple[str, list[Thing], Robot]:
         add_thing(world, assets, number, thing)
     assets.extend(robot.meshes)
     world.append(robot.body)
+    if robot.cup_m is not None:
+        add_cup(root, robot.tool, len(things))
     # A contact has the mean of both sides in Nudge; MuJoCo takes the arm's number, which has priority.
     objects = [thing.friction for thing in things] or [SHELF_FRICTION]
     mean = 0.5 * (TOOL_FRICTION + sum(objects) / len(objects))

@@ -12,6 +12,8 @@ from .shapes import ROOT
 SHIPPED = ROOT / "assets" / "robots" / "ur5_2f85.urdf"
 # What a tool's link is called where the scene does not say.
 TOOL_LINKS = ["tool", "tool0", "tcp", "ee_link", "tool_link"]
+# A link with a cylinder as wide as the rim, of a hand that holds by suction.
+CUP_LINK = "suction_cup"
 # So much added to the arm's inertia, kg m^2, that nothing it touches changes how it moves.
 ARMATURE = 1e4
 
@@ -24,6 +26,9 @@ class Robot:
     meshes: list[ET.Element]
     # The joints from the base to the tool.
     joints: list[str]
+    # The link that is the tool, and the radius of the suction cup's rim, metres, where there is one.
+    tool: str
+    cup_m: float | None
 
 
 def text(numbers) -> str:
@@ -92,7 +97,17 @@ class Reader:
         """The arm where the scene puts it. The base and what is fixed to it meet nothing."""
         yaw = math.radians(placement.get("yaw_deg", 0.0))
         where = {"pos": text(placement.get("base", [0.0, -0.70, -0.015])), "quat": text(quaternion([0, 0, yaw]))}
-        return Robot(self.body(self.root, where, moves=False), self.meshes, self.chain)
+        return Robot(self.body(self.root, where, moves=False), self.meshes, self.chain, self.tool, self.cup())
+
+    def cup(self) -> float | None:
+        """The radius of the suction cup's rim, metres, if the hand has one."""
+        if CUP_LINK not in self.links:
+            return None
+        cylinders = self.links[CUP_LINK].iterfind("collision/geometry/cylinder")
+        radii = [float(cylinder.get("radius")) for cylinder in cylinders]
+        if not radii or self.joints_to(CUP_LINK) != self.chain:
+            raise WorldError(f"{self.source}: `{CUP_LINK}` must be fixed to the hand and have a cylinder as wide as its rim")
+        return max(radii)
 
     def body(self, link: str, where: dict[str, str], moves: bool) -> ET.Element:
         """A link with what hangs from it."""

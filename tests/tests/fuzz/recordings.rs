@@ -2,7 +2,7 @@
 
 use super::engine::Target;
 use super::episodes::episode;
-use nudge::workbench::annotations::Annotations;
+use nudge::annotations::Annotations;
 use nudge::workbench::recording_file;
 
 #[test]

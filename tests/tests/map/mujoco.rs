@@ -58,13 +58,17 @@ fn run<'a>(scene: &'a str, world: &'a str, out: &'a str) -> Vec<&'a str> {
 
 /// The motion of a step of `episode.json` in the protocol's words.
 fn motion(step: &Value) -> Value {
-    let phase = |kind: &str, filed: &Value| {
+    let phase = |kind: &Value, filed: &Value| {
         let stops = filed["stops"].as_array().expect("stops");
         let column = |name: &str| stops.iter().map(|stop| stop[name].clone()).collect::<Vec<Value>>();
         json!({ "kind": kind, "opening_m": 0.0, "at_s": column("at_s"), "joints": column("joints") })
     };
     let filed = &step["decision"]["motion"];
-    json!({ "phases": [phase("approach", &filed["way_in"]), phase("contact", &filed["push"])] })
+    let phases: Vec<Value> = match filed["phases"].as_array() {
+        Some(phases) => phases.iter().map(|filed| phase(&filed["kind"], &filed["motion"])).collect(),
+        None => vec![phase(&json!("approach"), &filed["way_in"]), phase(&json!("contact"), &filed["push"])],
+    };
+    json!({ "phases": phases })
 }
 
 fn begin(scene: &str, folder: &Path, done: &[Value]) -> Value {
@@ -114,6 +118,56 @@ fn an_episode_in_mujoco_has_no_truth_pushes_something_and_goes_on_after_a_crash(
     let (whole, broken) = (beliefs(Path::new(&whole)), beliefs(Path::new(&broken)));
     let same = whole.iter().zip(&broken).all(|(a, b)| a.occupancy == b.occupancy && a.semantics == b.semantics);
     assert!(whole.len() == broken.len() && same, "the beliefs differ");
+}
+
+#[test]
+fn a_pick_in_mujoco_takes_the_object_out_of_the_shelf_and_finds_no_seal_where_it_is_not() {
+    let Some(world) = World::new() else { return };
+    let folder = Folder::new();
+    let (scene, out, truth) = (folder.write("small.toml", SCENE), folder.name("out"), folder.name("truth.jsonl"));
+    let command = format!("{} --truth {truth}", world.command());
+    let settings = ["--policy", "random-pick-5", "--place", "tray", "--belief", "classical", "--budget", "6"];
+    let run = ["run", &scene, "--world", &command, "--out", &out, "--world-timeout", "120"];
+    nudge_ok(&[&run[..], &settings].concat());
+    let read = |path: PathBuf| text(&std::fs::read(path).expect("a file"));
+    let record: Value = serde_json::from_str(&read(Path::new(&out).join("episode.json"))).expect("JSON");
+    let pick = &record["steps"][4];
+    assert_eq!((&pick["action"]["kind"], &pick["push"]["grip"]["end"]), (&json!("pick"), &json!("stowed")), "{pick}");
+
+    // What the world says of where the objects are: one is beside the robot, no other has moved.
+    let standing: Vec<Value> =
+        read(truth.into()).lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let [before, after] = [0, 1].map(|line: usize| standing[line].as_array().expect("objects"));
+    let place = |object: &Value| [0, 1, 2].map(|axis: usize| object["position"][axis].as_f64().expect("a number"));
+    let mut taken = Vec::new();
+    for (at, (before, after)) in before.iter().zip(after).enumerate() {
+        if after["stowed"] == json!(true) {
+            taken.push(at);
+        } else {
+            let ways = place(before).into_iter().zip(place(after)).map(|(a, b)| (a - b).abs());
+            assert!(ways.fold(0.0, f64::max) < 0.001, "{before} moved to {after}");
+        }
+    }
+    let [taken] = taken[..] else { panic!("objects {taken:?} were taken") };
+
+    // The same motion where that object stands 40 mm aside.
+    let good = begin(&scene, &folder.path(""), &[]);
+    let mut aside = good.clone();
+    let x = aside["scene"]["objects"][taken]["position"][0].as_f64().expect("a number");
+    aside["scene"]["objects"][taken]["position"][0] = json!(x + 0.04);
+    let ends = [good, aside].map(|begin| {
+        let requests =
+            [json!({ "id": 0, "begin": with_robot(begin, &record) }), json!({ "id": 1, "move": motion(pick) })];
+        let (answers, _) = world.answers(&[], &requests);
+        answers[1]["moved"]["grip"].clone()
+    });
+    assert_eq!(ends, [json!("stowed"), json!("no_seal")]);
+}
+
+/// A beginning with the arm of an episode.
+fn with_robot(mut begin: Value, record: &Value) -> Value {
+    begin["scene"]["robot"] = record["scene"]["robot"].clone();
+    begin
 }
 
 #[test]

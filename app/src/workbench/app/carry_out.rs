@@ -126,7 +126,8 @@ impl App {
             MenuCommand::SaveSceneAs
             | MenuCommand::ExportEpisode
             | MenuCommand::ExportTables
-            | MenuCommand::ExportPicture => self.ask_where(entry),
+            | MenuCommand::ExportPicture
+            | MenuCommand::Share => self.ask_where(entry),
             MenuCommand::CloseEpisode => self.model.shown.into_iter().for_each(|id| self.close(id)),
             MenuCommand::Quit => self.quit_asked = true,
             MenuCommand::Undo => self.model.author.undo(),

@@ -1,7 +1,8 @@
 //! What is read and written: scenes, episodes and recordings that are opened, notes and scenes that are saved, exports.
 
 use super::{App, Chosen, ChosenFor, Opening};
-use crate::workbench::annotations;
+use crate::annotations;
+use crate::share::{self, Source};
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::dialog::Dialog;
 use crate::workbench::export;
@@ -137,6 +138,7 @@ impl App {
                     dialog.pick_folder()
                 }
                 MenuCommand::SaveSceneAs => dialog.add_filter("Scene", &["toml"]).save_file(),
+                MenuCommand::Share => dialog.add_filter("Page", &["html"]).save_file(),
                 _ => dialog.add_filter("Picture", &["png"]).save_file(),
             };
             let told = match path {
@@ -220,6 +222,7 @@ impl App {
         match what {
             MenuCommand::ExportEpisode => free(&exports, &name, ""),
             MenuCommand::ExportTables => free(&exports, &format!("{name}-tables"), ""),
+            MenuCommand::Share => free(&exports, &name, ".html"),
             MenuCommand::SaveSceneAs => {
                 free(&self.options.scenes.join("mine"), &self.model.author.scene().name, ".toml")
             }
@@ -240,6 +243,7 @@ impl App {
                 self.picture_to = Some((part, path));
                 self.picture_asked = true;
             }
+            MenuCommand::Share => self.share(path),
             _ => {
                 if let Some(session) = self.model.session().cloned() {
                     self.export(what, session, path);
@@ -264,6 +268,29 @@ impl App {
             };
             match written {
                 Ok(()) => (Level::Info, format!("Exported to {}", path.display())),
+                Err(error) => (Level::Error, error.to_string()),
+            }
+        });
+    }
+
+    /// Writes what is on the window as one page, from the files of its episodes and from notes that are not saved yet.
+    fn share(&mut self, path: PathBuf) {
+        let on_show = self.model.on_show();
+        let episodes: Vec<_> = on_show.map(|session| (session.path.clone(), session.annotations.clone())).collect();
+        if episodes.is_empty() {
+            return;
+        }
+        self.task(format!("Writing {}", path.display()), move |watch| {
+            if let Some(folder) = path.parent() {
+                let _ = std::fs::create_dir_all(folder);
+            }
+            let filed =
+                episodes.iter().map(|(directory, notes)| Source { directory, annotations: Some(notes.clone()) });
+            match share::write(&filed.collect::<Vec<_>>(), &path, watch) {
+                Ok(shared) => {
+                    let said = std::iter::once(format!("Wrote {}.", path.display())).chain(shared.left_out);
+                    (Level::Info, said.collect::<Vec<_>>().join(" "))
+                }
                 Err(error) => (Level::Error, error.to_string()),
             }
         });

@@ -1,7 +1,7 @@
 //! What comes in every frame: events of workers, answers of jobs, clicks in the viewer, keys, dropped files.
 
 use super::{App, Chosen, ChosenFor};
-use crate::workbench::annotations::Annotations;
+use crate::annotations::Annotations;
 use crate::workbench::command::{Command, Level, MenuCommand};
 use crate::workbench::derive::Derived;
 use crate::workbench::dialog::Dialog;

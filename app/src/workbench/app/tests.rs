@@ -290,6 +290,25 @@ fn without_a_file_dialog_a_path_is_typed() {
 }
 
 #[test]
+fn what_is_on_the_window_is_shared_as_a_page_with_notes_that_are_not_saved() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut harness = window(folder.path(), 2);
+    harness.state_mut().ask(Command::DoIt);
+    wait(&mut harness);
+    harness.state_mut().ask(Command::Note(1, "not saved".to_owned()));
+    harness.state_mut().ask(Command::Menu(MenuCommand::Share));
+    harness.run_steps(3);
+    harness.get_by_label("Write").click();
+    wait(&mut harness);
+    let session = harness.state().model.session().expect("open");
+    let mut page = folder.path().join("out/exports").join(session.path.file_name().expect("name")).into_os_string();
+    page.push(".html");
+    let html = std::fs::read_to_string(page).expect("a page");
+    assert!(html.starts_with("<!DOCTYPE html>") && html.contains("id=\"part-a-states\""));
+    assert!(session.unsaved, "sharing saves nothing");
+}
+
+#[test]
 fn whoever_is_new_is_shown_around_once_and_its_keys_reach_nothing_else() {
     let folder = tempfile::tempdir().expect("folder");
     let mut harness = window(folder.path(), 2);

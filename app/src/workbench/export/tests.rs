@@ -1,6 +1,6 @@
-use super::super::annotations::{Annotations, object_name};
 use super::super::fixture;
 use super::*;
+use crate::annotations::{Annotations, object_name};
 use crate::picture::RgbImage;
 use nudge_core::score::Verdict;
 use std::cell::Cell;

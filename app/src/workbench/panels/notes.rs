@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::workbench::annotations::{Judged, VERDICTS, verdict_title};
+use crate::annotations::{Judged, VERDICTS, verdict_title};
 use crate::workbench::command::Command;
 use crate::workbench::model::Model;
 use crate::workbench::session::Session;

@@ -1,5 +1,5 @@
 use super::*;
-use crate::workbench::annotations::object_name;
+use crate::annotations::object_name;
 use crate::workbench::fixture;
 use crate::workbench::panels::photo;
 use egui_kittest::Harness;

@@ -8,7 +8,10 @@ use nudge_tests::{Folder, TIN, nudge, nudge_bin, nudge_fails, nudge_ok, small_sc
 use std::path::Path;
 use std::process::Command;
 
-const EVIL: &str = "<script>document.title='stolen'</script>";
+/// A scene's name as bad as it may be: it has no slash in it.
+const EVIL: &str = "<img src=x onerror=document.title='stolen'>";
+/// A note may hold anything.
+const WORSE: &str = "</script><script>document.title='stolen'</script>";
 
 /// Runs a small episode into a folder and returns its path.
 fn episode(folder: &Folder, name: &str, scene_name: &str, budget: &str) -> String {
@@ -40,7 +43,7 @@ fn a_page_is_one_file_that_asks_for_nothing_and_reads_no_name_as_markup() {
     let html = std::fs::read_to_string(&page).expect("a page");
     assert!(html.len() < 6_000_000, "{}", html.len());
     assert!(!html.contains("http:") && !html.contains("https:") && !html.contains(EVIL));
-    assert!(html.contains("<title>&lt;script&gt;document.title"), "the title is its text");
+    assert!(html.contains("<title>&lt;img src=x"), "the title is its text");
     // The recording is small, and so it is inside.
     assert!(html.contains("id=\"part-a-recording\""));
     // Without weights, and beside the directory unless told otherwise, it is the same.
@@ -81,7 +84,7 @@ fn the_page_walks_through_the_clock_the_slider_and_a_comparison_with_an_empty_co
     let b = episode(&folder, "b", "another", "4");
     std::fs::write(
         folder.path("a").join("notes.json"),
-        serde_json::json!({ "format": 1, "notes": { "3": format!("seen {EVIL}") } }).to_string(),
+        serde_json::json!({ "format": 1, "notes": { "3": format!("seen {WORSE}") } }).to_string(),
     )
     .expect("written");
     let page = share(&folder, &[&a], "a.html");
@@ -110,7 +113,7 @@ fn the_page_walks_through_the_clock_the_slider_and_a_comparison_with_an_empty_co
         "(() => { const s = document.getElementById('step'); s.value = 3; s.dispatchEvent(new Event('input')); })()",
     );
     browser.wait("location.hash.includes('step=3&')");
-    assert!(browser.text("document.querySelector('.note').textContent").ends_with(EVIL), "a note is text");
+    assert!(browser.text("document.querySelector('.note').textContent").ends_with(WORSE), "a note is text");
     let before = browser.text(voxels);
     browser.value("(() => { const s = document.getElementById('above'); s.value = 0.95; s.dispatchEvent(new Event('input')); })()");
     assert_ne!(browser.text(voxels), before);

@@ -177,7 +177,7 @@ impl Panel for State {
 RUST
 after $panels.rs 'pub mod scenes;' 'pub mod scratch;'
 after app/src/workbench/app/shown.rs 'pub gains: gains::State,' '    pub scratch: crate::workbench::panels::scratch::State,'
-after app/src/workbench/app/draw.rs 'self.panels.decision.show(' '                        self.panels.scratch.show(ui, &mut self.model, ask);'
+after app/src/workbench/app/around.rs 'self.panels.decision.show(' '                        self.panels.scratch.show(ui, &mut self.model, ask);'
 end
 
 begin 'a layout' gains ''
@@ -190,7 +190,7 @@ after $kinds 'Self::Gains => "Gains",' '            Self::Scratch => "Scratch",'
 after $kinds 'Self::Gains => "The' '            Self::Scratch => "Scratch",'
 change $kinds 'Self::Episode | Self::Author => 3' 'Self::Episode | Self::Author | Self::Scratch => 3'
 after app/src/workbench/menu.rs 'Some(M::Layout(LayoutKind::Gains)),' '            Some(M::Layout(LayoutKind::Scratch)),'
-after app/src/workbench/app/draw.rs 'LayoutKind::Gains =>' \
+after app/src/workbench/app/around.rs 'LayoutKind::Gains =>' \
     '                    LayoutKind::Scratch => self.panels.scratch.show(ui, &mut self.model, ask),'
 change app/src/workbench/space/layout.rs 'LayoutKind::Author => return None' 'LayoutKind::Author | LayoutKind::Scratch => return None'
 change app/src/workbench/shot.rs 'LayoutKind::Compare | LayoutKind::Author' 'LayoutKind::Compare | LayoutKind::Author | LayoutKind::Scratch'

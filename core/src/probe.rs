@@ -12,7 +12,7 @@
 //! cross-entropy of what is occupied afterwards, by the prediction and by the belief as it is.
 //!
 //! Two other judges are asked the same first question, to tell what a poor choice is due to: the space that each candidate truly
-//! opens, and the mean over completions of the shelf ([`completion`]), which is the most that a belief can know.
+//! opens, and the mean over completions of the shelf (`completion`), which is the most that a belief can know.
 
 mod completion;
 mod predicted;

@@ -21,7 +21,7 @@ enum Part {
 /// The file.
 pub(super) fn write(belief: &Belief) -> Vec<u8> {
     let voxel_m = f64::from(belief.grid.voxel_m);
-    let first = belief.grid.origin.map(|m| (f64::from(m) / voxel_m + 1e-3).ceil() as i64 + MIDDLE);
+    let first = belief.grid.origin.map(|m| (f64::from(m) / voxel_m - 1e-3).ceil() as i64 + MIDDLE);
     let mut writer = Writer { belief, first, data: Vec::new(), nodes: 0 };
     let root = writer.part([0; 3], DEPTH);
     let mut data = writer.data;

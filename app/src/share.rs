@@ -1,7 +1,7 @@
 //! `nudge share`: an episode, or two beside each other, as one HTML page that needs nothing else.
 //!
-//! An [`episode`](Source) is read from its directory alone: no networks, no simulation. [`states`] packs what was believed
-//! after every step, [`camera`] what the camera saw, [`story`] what was done, weighed, scored and said; [`page`] puts them
+//! An [`episode`](Source) is read from its directory alone: no networks, no simulation. `states` packs what was believed
+//! after every step, `camera` what the camera saw, `story` what was done, weighed, scored and said; `page` puts them
 //! together with the page's own script. Everything is compressed and in base64, so that no name in it is ever read as HTML.
 //!
 //! The page is at most [`LIMIT`] bytes long: of long episodes it holds the beliefs of every n-th step, and says so.

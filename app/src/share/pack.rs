@@ -94,7 +94,7 @@ mod tests {
         }
         let mut packed = Vec::new();
         runs(&old, &new, &mut packed);
-        assert_eq!(packed[0], 5, "0 to 1 and 5 (three equal ones between), 400 to 403, 408, 999: {packed:?}");
+        assert_eq!(packed[0], 4, "0 to 1 and 5 (three equal ones between), 400 to 403, 408, 999: {packed:?}");
         assert_eq!(applied(old.clone(), &packed), new);
         let mut nothing = Vec::new();
         runs(&old, &old, &mut nothing);

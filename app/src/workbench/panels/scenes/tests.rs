@@ -112,26 +112,22 @@ fn what_a_search_hits_by_name_comes_before_what_it_hits_by_path() {
 }
 
 #[test]
-fn an_episode_comes_first_and_a_click_opens_it() {
+fn a_recording_comes_before_the_scenes_and_a_click_opens_it() {
     let folder = folder();
     let out = folder.path().join("out");
-    std::fs::create_dir_all(out.join("mine")).expect("made");
-    let record = crate::workbench::fixture::session(0).record;
-    std::fs::write(out.join("mine/episode.json"), serde_json::to_vec(&record).expect("JSON")).expect("written");
+    std::fs::create_dir_all(&out).expect("made");
     std::fs::write(out.join("loose.rrd"), "a recording").expect("written");
     let draw = |ui: &mut egui::Ui, stage: &mut Stage| show(ui, &mut stage.model, &mut stage.asked);
     let folders = Folders { episodes: Some(out.clone()), ..scenes(folder.path()) };
     let model = Model { browser: Browser::of(folders), ..Model::default() };
     let mut harness = Harness::builder().with_size([900.0, 700.0]).build_ui_state(draw, Stage { model, asked: vec![] });
-    let done = format!("{} of {} actions", record.steps.len(), record.config.budget);
-    wait_for(&mut harness, &done);
     wait_for(&mut harness, "loose, recording");
     wait_for(&mut harness, "alpha, 1 object, 0 hidden");
     let top = |text: &str| harness.query_all_by_label_contains(text).next().expect("a card").rect().top();
-    assert!(top(&done) < top("alpha, 1 object"));
-    harness.query_all_by_label_contains(&done).next().expect("a card").click();
+    assert!(top("loose, recording") < top("alpha, 1 object"));
+    harness.query_all_by_label_contains("loose, recording").next().expect("a card").click();
     harness.run_steps(2);
-    assert!(matches!(&harness.state().asked[..], [Command::Open(path)] if *path == out.join("mine")));
+    assert!(matches!(&harness.state().asked[..], [Command::Open(path)] if *path == out.join("loose.rrd")));
 }
 
 #[test]
